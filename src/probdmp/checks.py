@@ -1,0 +1,134 @@
+"""Validation at the boundary: each `check_*` returns the clean value or raises an error that names the offender.
+
+Code behind the boundary assumes what was checked here and checks nothing again.
+"""
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from probdmp.errors import InputError, InputTypeError
+
+__all__ = [
+    "LARGEST_MAGNITUDE",
+    "FloatArray",
+    "check_array",
+    "check_choice",
+    "check_count",
+    "check_fraction",
+    "check_positive",
+    "frozen",
+    "shape_text",
+]
+
+FloatArray = NDArray[np.float64]
+
+LARGEST_MAGNITUDE = 1e100
+"""Values beyond this are refused: variances square them, and the square must stay finite."""
+
+
+def shape_text(shape: Sequence[int | str | None]) -> str:
+    """How a shape is written in messages: `(T, 2)`."""
+    inner = ", ".join("any" if n is None else str(n) for n in shape)
+    return f"({inner},)" if len(shape) == 1 else f"({inner})"
+
+
+def check_array(
+    value: ArrayLike,
+    name: str,
+    shape: Sequence[int | str | None],
+    *,
+    missing: bool = False,
+    hint: str = "",
+) -> FloatArray:
+    """A float64 array of the asked shape, finite and of a size whose square is finite.
+
+    Parameters
+    ----------
+    shape : one entry per axis: a number for a fixed length, a letter or None for any length.
+    missing : whether NaN is allowed, as a mark for "not measured".
+    hint : added to the message when the shape is wrong.
+
+    Raises
+    ------
+    InputTypeError
+        If the values are not real numbers.
+    InputError
+        If the shape differs, a value is NaN (unless `missing`) or infinite, or larger than `LARGEST_MAGNITUDE`.
+    """
+    if isinstance(value, np.ma.MaskedArray) and value.dtype.kind in "fiu":
+        value = np.ma.filled(value.astype(np.float64), np.nan)
+    try:
+        raw = np.asarray(value)
+    except ValueError as error:
+        raise InputError(f"{name} as a rectangular array", "rows of different lengths", hint) from error
+    if raw.dtype.kind not in "fiu":
+        raise InputTypeError(f"{name} as real numbers", f"dtype {raw.dtype}", "Convert it with numpy.asarray(..., float).")
+    array = np.ascontiguousarray(raw, dtype=np.float64).reshape(raw.shape)
+    wanted = shape_text(shape)
+    actual: tuple[int, ...] = array.shape
+    if len(actual) != len(shape) or any(isinstance(n, int) and n != m for n, m in zip(shape, actual, strict=True)):
+        raise InputError(f"{name} of shape {wanted}", shape_text(actual), hint)
+    bad = ~np.isfinite(array)
+    if missing:
+        bad &= ~np.isnan(array)
+    if bad.any():
+        first = np.argwhere(bad)[0].tolist()
+        raise InputError(
+            f"{name} finite" + (" or NaN for 'not measured'" if missing else ""),
+            f"{array[tuple(first)]} at index {first} ({int(bad.sum())} such values)",
+            "Drop or interpolate these samples first." if not missing else "Replace infinities by NaN.",
+        )
+    largest = float(np.max(np.abs(array), initial=0.0, where=~np.isnan(array)))
+    if largest > LARGEST_MAGNITUDE:
+        raise InputError(
+            f"{name} of magnitude at most {LARGEST_MAGNITUDE:g}", f"{largest:g}", "Rescale to usual units, such as metres."
+        )
+    return array
+
+
+def frozen(array: FloatArray) -> FloatArray:
+    """A read-only copy, for the fields of frozen values."""
+    copy = np.array(array, dtype=np.float64)
+    copy.setflags(write=False)
+    return copy
+
+
+def check_positive(value: object, name: str, unit: str = "", hint: str = "") -> float:
+    """A finite number > 0."""
+    wanted = f"{name} > 0" + (f" in {unit}" if unit else "")
+    array = np.asarray(value)
+    if array.ndim != 0 or array.dtype.kind not in "fiu":
+        raise InputTypeError(f"{wanted}, one number", repr(value), hint)
+    number = float(array)
+    if not 0 < number <= LARGEST_MAGNITUDE:
+        raise InputError(wanted, repr(value), hint)
+    return number
+
+
+def check_fraction(value: object, name: str, most: float = 1.0) -> float:
+    """A number from 0 to `most`."""
+    array = np.asarray(value)
+    if array.ndim != 0 or array.dtype.kind not in "fiu":
+        raise InputTypeError(f"{name} as one number from 0 to {most:g}", repr(value))
+    if not 0 <= float(array) <= most:
+        raise InputError(f"{name} as a number from 0 to {most:g}", repr(value))
+    return float(array)
+
+
+def check_count(value: object, name: str, least: int = 1, most: int | None = None, hint: str = "") -> int:
+    """A whole number from `least` to `most`."""
+    wanted = f"{name} as a whole number from {least}" + (f" to {most}" if most is not None else " up")
+    if isinstance(value, bool) or not isinstance(value, int | np.integer):
+        raise InputTypeError(wanted, repr(value), hint)
+    if value < least or (most is not None and value > most):
+        raise InputError(wanted, repr(value), hint)
+    return int(value)
+
+
+def check_choice(value: object, name: str, choices: Collection[str], hint: str = "") -> str:
+    """One of a fixed set of names."""
+    if not isinstance(value, str) or value not in choices:
+        raise InputError(f"{name} to be one of {', '.join(map(repr, choices))}", repr(value), hint)
+    return value

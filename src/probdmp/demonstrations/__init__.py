@@ -1,0 +1,22 @@
+"""Recorded movement as checked data, the built-in letters, and faults to inject."""
+
+from probdmp.demonstrations.demonstration import Demonstration, as_demonstrations, stack_positions
+from probdmp.demonstrations.faults import FAULTS, hold
+from probdmp.demonstrations.letters import LETTERS, WriterVariation, synthetic_letters
+from probdmp.demonstrations.resampling import demonstration_from_times
+from probdmp.demonstrations.smoothing import SmoothPath, noise_stds, smooth_path
+
+__all__ = [
+    "FAULTS",
+    "LETTERS",
+    "Demonstration",
+    "SmoothPath",
+    "WriterVariation",
+    "as_demonstrations",
+    "demonstration_from_times",
+    "hold",
+    "noise_stds",
+    "smooth_path",
+    "stack_positions",
+    "synthetic_letters",
+]

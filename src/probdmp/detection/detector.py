@@ -1,0 +1,164 @@
+"""Failure detectors: a statistic and a threshold for each primitive, the same online and over recordings."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from probdmp.checks import FloatArray, check_choice
+from probdmp.demonstrations import Demonstration, as_demonstrations
+from probdmp.detection.monitoring import LikelihoodMonitor, LikelihoodStatistic, replay
+from probdmp.detection.statistics import LIKELIHOODS
+from probdmp.detection.thresholds import PaperThreshold
+from probdmp.detection.verdict import Verdict
+from probdmp.dmp import Primitive, Task
+from probdmp.errors import InputError, NotFittedError
+from probdmp.execution import task_of_recording
+
+__all__ = ["FailureDetector"]
+
+RULES = ("paper",)
+
+Recordings = Demonstration | Sequence[Demonstration | ArrayLike] | FloatArray
+
+
+class Learned(Protocol):
+    """Something that holds a learned primitive, such as a ProbabilisticDMP."""
+
+    @property
+    def primitive_(self) -> Primitive: ...
+
+
+class FailureDetector:
+    """Decides, while a movement runs or over its recording, whether it is still the movement that was taught.
+
+    Parameters
+    ----------
+    rule : `"paper"`: failed when the log-likelihood falls below twice its minimum over the training demonstrations.
+    likelihood : `"per_step"`: of each step by itself; `"cumulative"`: of all steps so far. The paper does not say which.
+    """
+
+    def __init__(self, *, rule: str = "paper", likelihood: str = "per_step") -> None:
+        self.rule, self.likelihood = rule, likelihood
+
+    def fit(
+        self,
+        learned: Primitive | Learned | Mapping[str, Learned],
+        demonstrations: Recordings | Mapping[str, Recordings],
+        dt: float | None = None,
+        tasks: Sequence[Task] | Mapping[str, Sequence[Task]] | None = None,
+    ) -> Self:
+        """Learn what is normal from the demonstrations that taught a primitive.
+
+        Parameters
+        ----------
+        learned : a learned primitive, or a library of them by label; demonstrations and tasks then come by label too.
+        dt : seconds between samples of bare arrays; as learned unless given.
+        tasks : what each demonstration was asked to do; its own first row and length and the learned goal unless given. Say
+            as much as will be known when executing: the detector takes the spread it is shown for normal.
+        """
+        check_choice(self.rule, "rule", RULES)
+        check_choice(self.likelihood, "likelihood", LIKELIHOODS)
+        library = learned if isinstance(learned, Mapping) else {"": learned}
+        recordings = _by_label(demonstrations, library, "demonstrations")
+        asked = _by_label(tasks, library, "tasks") if tasks is not None else dict.fromkeys(library)
+        self.primitives_ = {label: _primitive_of(item) for label, item in library.items()}
+        self.thresholds_ = {
+            primitive.identity: self._threshold(primitive, recordings[label], dt, asked[label])
+            for label, primitive in self.primitives_.items()
+        }
+        return self
+
+    def monitor(self, primitive: Primitive) -> LikelihoodMonitor:
+        """A fresh judge for one execution of a primitive, which the detector must have been fitted to."""
+        threshold = self._fitted_thresholds().get(primitive.identity)
+        if threshold is None:
+            raise InputError(
+                "a primitive that this detector was fitted to", "another one", "Learned anew? Fit the detector again too."
+            )
+        return LikelihoodMonitor(primitive, self.likelihood, threshold)
+
+    def verdicts(self, executions: Recordings, dt: float | None = None, tasks: Sequence[Task] | None = None) -> list[Verdict]:
+        """A verdict for each recorded execution; with a library, the label of an execution says which primitive it runs.
+
+        Parameters
+        ----------
+        dt, tasks : as in `fit`, one task for each execution.
+        """
+        self._fitted_thresholds()
+        alone = next(iter(self.primitives_.values())) if len(self.primitives_) == 1 else None
+        recordings = as_demonstrations(executions, dt if dt is not None or alone is None else alone.dt)
+        verdicts: dict[int, Verdict] = {}
+        for label, members in _members_by_label(recordings, alone).items():
+            if alone is None and label not in self.primitives_:
+                raise InputError(f"executions labelled as one of {sorted(self.primitives_)}", repr(label))
+            primitive = alone or self.primitives_[label]
+            chosen = [recordings[k] for k in members]
+            asked = [tasks[k] for k in members] if tasks is not None else _own_tasks(primitive, chosen)
+            for k, ticks in zip(members, replay(primitive, asked, chosen), strict=True):
+                monitor = self.monitor(primitive)
+                for observed in ticks:
+                    monitor.update(observed)
+                verdicts[k] = monitor.verdict
+        return [verdicts[k] for k in range(len(recordings))]
+
+    def predict(
+        self, executions: Recordings, dt: float | None = None, tasks: Sequence[Task] | None = None
+    ) -> NDArray[np.int64]:
+        """(N,) array: +1 for a fine execution, -1 for a failed one; arguments as in `verdicts`."""
+        return np.array([-1 if verdict.failed else 1 for verdict in self.verdicts(executions, dt, tasks)], dtype=np.int64)
+
+    def state(self) -> dict[str, Any]:
+        """What a model file keeps, as plain values."""
+        minima = {identity: threshold.minimum for identity, threshold in self._fitted_thresholds().items()}
+        return {"rule": self.rule, "likelihood": self.likelihood, "minima": minima}
+
+    @classmethod
+    def from_state(cls, state: Mapping[str, Any], primitives: Mapping[str, Primitive]) -> Self:
+        """A fitted detector from a model file: its state and the primitives it was fitted to, by label."""
+        detector = cls(rule=state["rule"], likelihood=state["likelihood"])
+        detector.primitives_ = dict(primitives)
+        detector.thresholds_ = {identity: PaperThreshold(float(minimum)) for identity, minimum in state["minima"].items()}
+        return detector
+
+    def _fitted_thresholds(self) -> dict[str, PaperThreshold]:
+        if not hasattr(self, "thresholds_"):
+            raise NotFittedError("a fitted detector", "one without thresholds", "Call fit(primitive, demonstrations) first.")
+        return self.thresholds_
+
+    def _threshold(
+        self, primitive: Primitive, demonstrations: Recordings, dt: float | None, tasks: Sequence[Task] | None
+    ) -> PaperThreshold:
+        recordings = as_demonstrations(demonstrations, primitive.dt if dt is None else dt)
+        minimum = np.inf
+        for ticks in replay(primitive, tasks or _own_tasks(primitive, recordings), recordings):
+            statistic = LikelihoodStatistic(self.likelihood, primitive.ranges)
+            minimum = min(minimum, *(statistic.update(observed)[0] for observed in ticks))
+        return PaperThreshold(minimum)
+
+
+def _primitive_of(learned: Primitive | Learned) -> Primitive:
+    return learned if isinstance(learned, Primitive) else learned.primitive_
+
+
+def _own_tasks(primitive: Primitive, recordings: Sequence[Demonstration]) -> list[Task]:
+    return [task_of_recording(primitive, recording) for recording in recordings]
+
+
+def _by_label(values: Any, library: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    """Values given for one primitive or by label, by label."""
+    if set(library) == {""} and not isinstance(values, Mapping):
+        return {"": values}
+    if not isinstance(values, Mapping) or not set(library) <= set(values):
+        given = sorted(values) if isinstance(values, Mapping) else type(values).__name__
+        raise InputError(f"{name} by label for each of {sorted(library)}", str(given))
+    return values
+
+
+def _members_by_label(recordings: Sequence[Demonstration], alone: Primitive | None) -> dict[str, list[int]]:
+    """Which recordings belong to which primitive."""
+    members: dict[str, list[int]] = {}
+    for k, recording in enumerate(recordings):
+        members.setdefault("" if alone is not None else recording.label, []).append(k)
+    return members

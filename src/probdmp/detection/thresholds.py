@@ -1,0 +1,25 @@
+"""From a statistic to a test ratio: above 1 is an alarm."""
+
+from dataclasses import dataclass
+
+from probdmp.checks import LARGEST_MAGNITUDE
+
+__all__ = ["PaperThreshold"]
+
+
+@dataclass(frozen=True, slots=True)
+class PaperThreshold:
+    """The paper's rule: failed when the log-likelihood falls below twice its minimum over the training demonstrations.
+
+    Twice a positive minimum would lie above it, and the rule would call every execution failed; so it is read as
+    minimum - |minimum|, which is the same where the minimum is negative.
+    Source: Meier & Schaal 2016, "Failure Detection with Probabilistic DMPs".
+    """
+
+    minimum: float
+    """Least value of the statistic over the training demonstrations, nats."""
+
+    def test_ratio(self, statistic: float) -> float:
+        """How far below the minimum the statistic has fallen, in units of |minimum|; 0 where it has not."""
+        shortfall = max(self.minimum - statistic, 0.0)
+        return shortfall / max(abs(self.minimum), 1 / LARGEST_MAGNITUDE)

@@ -1,0 +1,316 @@
+"""The estimators: scikit-learn manners, no arithmetic."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from probdmp.checks import FloatArray, check_choice, check_count, check_positive
+from probdmp.demonstrations import Demonstration, as_demonstrations
+from probdmp.demonstrations.demonstration import MILLISECONDS_HINT
+from probdmp.detection import FailureDetector
+from probdmp.dmp import Configuration, Primitive, Task, task_for
+from probdmp.errors import InputError, NotFittedError
+from probdmp.execution import (
+    GaussianTrajectory,
+    OnlineExecution,
+    TrackedTrajectory,
+    roll_out,
+    sample_trajectories,
+    score_recordings,
+    smooth_recording,
+    task_of_recording,
+    track_recording,
+)
+from probdmp.io import ModelContents, read_model, write_model
+from probdmp.learning import FitReport, LearningOptions, fit_primitive
+
+__all__ = ["PrimitiveLibrary", "ProbabilisticDMP", "load", "load_detector"]
+
+WEIGHT_UNCERTAINTIES = ("independent",)
+
+Recording = Demonstration | ArrayLike
+Recordings = Demonstration | Sequence[Recording] | FloatArray
+
+
+class ProbabilisticDMP:
+    """A probabilistic Dynamic Movement Primitive: learn a movement, roll it out, execute it with feedback, judge it.
+
+    Parameters
+    ----------
+    n_basis : basis functions per degree of freedom.
+    weight_model : `"pooled"`: one set of weights behind all demonstrations (the paper).
+    weight_uncertainty : `"independent"`: the forcing term is redrawn at every step (the paper).
+    forcing_noise : `"predictive"`: single executions stray from the mean forcing term as the demonstrations do;
+        `"posterior"`: only the mean itself is uncertain, and the sensor noise has to explain the spread.
+    discretization : `"exact"` or `"semi_implicit_euler"` (the paper).
+    scaling : `"none"` or `"paper"`: the forcing term grows with the distance from start to goal.
+    alpha_z : spring constant of the transformation system, dimensionless.
+    smoothing : window of the Savitzky-Golay filter as a fraction of a demonstration.
+
+    Attributes
+    ----------
+    primitive_ : Primitive, the learned movement.
+    fit_report_ : FitReport, how well it says what it was shown; None if loaded from a file.
+
+    Notes
+    -----
+    Wherever `start`, `goal`, `duration`, `dt` are not given, they are as learned; for recordings, the recording's own first
+    row, length and dt, and the learned goal. Positions are in data units, times in seconds, arrays time first: (T, D).
+    """
+
+    def __init__(
+        self,
+        n_basis: int = 30,
+        *,
+        weight_model: str = "pooled",
+        weight_uncertainty: str = "independent",
+        forcing_noise: str = "predictive",
+        discretization: str = "exact",
+        scaling: str = "none",
+        alpha_z: float = 25.0,
+        smoothing: float = 0.05,
+    ) -> None:
+        self.n_basis = n_basis
+        self.weight_model = weight_model
+        self.weight_uncertainty = weight_uncertainty
+        self.forcing_noise = forcing_noise
+        self.discretization = discretization
+        self.scaling = scaling
+        self.alpha_z = alpha_z
+        self.smoothing = smoothing
+
+    @classmethod
+    def as_published(cls, n_basis: int = 30, *, forcing_noise: str = "predictive") -> Self:
+        """The paper's configuration: semi-implicit Euler, pooled weights, amplitude scaling; docs/paper.md has the details.
+
+        Parameters
+        ----------
+        forcing_noise : the paper does not say which; it speaks of a predictive distribution.
+        """
+        return cls(n_basis, forcing_noise=forcing_noise, discretization="semi_implicit_euler", scaling="paper")
+
+    def get_params(self) -> dict[str, Any]:
+        """The constructor's arguments by name."""
+        return {name: value for name, value in vars(self).items() if not name.endswith("_")}
+
+    def __repr__(self) -> str:
+        arguments = ", ".join(f"{name}={value!r}" for name, value in self.get_params().items())
+        return f"ProbabilisticDMP({arguments})"
+
+    def fit(self, demonstrations: Recordings, dt: float | None = None) -> Self:
+        """Learn from demonstrations, each with its own start, goal, duration and length.
+
+        Parameters
+        ----------
+        demonstrations : a list of Demonstration or of (T_k, D) arrays, or one (K, T, D) array.
+        dt : seconds between the samples of bare arrays.
+
+        Raises
+        ------
+        InputError, InputTypeError
+            If an argument or a demonstration cannot be used; the message names it and says what to do.
+        """
+        check_choice(self.weight_uncertainty, "weight_uncertainty", WEIGHT_UNCERTAINTIES)
+        configuration = Configuration(self.n_basis, self.alpha_z, self.discretization, self.scaling, self.forcing_noise)
+        options = LearningOptions(self.weight_model, self.smoothing)
+        self.primitive_: Primitive
+        self.fit_report_: FitReport | None
+        self.primitive_, self.fit_report_ = fit_primitive(as_demonstrations(demonstrations, dt), configuration, options)
+        return self
+
+    def rollout(
+        self,
+        start: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
+        duration: float | None = None,
+        dt: float | None = None,
+        start_velocity: ArrayLike | None = None,
+    ) -> GaussianTrajectory:
+        """The movement as planned, with its uncertainty. Source: Algorithm 1."""
+        task = task_for(self._learned(), start, goal, duration, start_velocity)
+        return roll_out(self._learned(), task, self._step(dt))
+
+    def track(
+        self,
+        observations: Recording,
+        dt: float | None = None,
+        start: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
+        duration: float | None = None,
+        start_velocity: ArrayLike | None = None,
+    ) -> TrackedTrajectory:
+        """Kalman filter over a recorded execution, (T, D), NaN where nothing was measured. Source: Algorithm 2."""
+        recording = self._recording(observations, dt)
+        task = task_of_recording(self._learned(), recording, start, goal, duration, start_velocity)
+        return track_recording(self._learned(), task, recording)
+
+    def smooth(
+        self,
+        observations: Recording,
+        dt: float | None = None,
+        start: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
+        duration: float | None = None,
+        start_velocity: ArrayLike | None = None,
+    ) -> GaussianTrajectory:
+        """The state at each time given the whole recorded execution, before and after."""
+        recording = self._recording(observations, dt)
+        task = task_of_recording(self._learned(), recording, start, goal, duration, start_velocity)
+        return smooth_recording(self._learned(), task, recording)
+
+    def execute(
+        self,
+        start: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
+        duration: float | None = None,
+        dt: float | None = None,
+        detector: FailureDetector | None = None,
+        start_velocity: ArrayLike | None = None,
+        on_alarm: str = "continue",
+    ) -> OnlineExecution:
+        """An execution to be stepped tick by tick with what the sensors say. Source: Algorithm 2, ExecuteAndMonitor.
+
+        Parameters
+        ----------
+        detector : judges the execution while it runs.
+        on_alarm : `"continue"` or `"hold"`, what is commanded after an alarm; see `OnlineExecution`.
+        """
+        task = task_for(self._learned(), start, goal, duration, start_velocity)
+        return OnlineExecution(self._learned(), task, self._step(dt), detector, on_alarm)
+
+    def score_samples(self, executions: Recordings, dt: float | None = None, tasks: Sequence[Task] | None = None) -> FloatArray:
+        """Total log-likelihood of each recorded execution, (N,) array, nats, computed side by side.
+
+        Parameters
+        ----------
+        tasks : what each was asked to do; its own first row and length and the learned goal unless given.
+        """
+        primitive, recordings = self._learned(), as_demonstrations(executions, self._step(dt))
+        asked = tasks if tasks is not None else [task_of_recording(primitive, recording) for recording in recordings]
+        return score_recordings(primitive, asked, recordings)
+
+    def sample(
+        self,
+        n_samples: int = 1,
+        start: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
+        duration: float | None = None,
+        dt: float | None = None,
+        start_velocity: ArrayLike | None = None,
+        sensor_noise: bool = True,
+        random_state: int | np.random.Generator | None = None,
+    ) -> list[FloatArray]:
+        """Draw executions from the model: a list of n_samples (T, D) arrays.
+
+        Parameters
+        ----------
+        sensor_noise : whether positions are as a sensor would record them, or as they are.
+        """
+        task, count = task_for(self._learned(), start, goal, duration, start_velocity), check_count(n_samples, "n_samples")
+        rng = np.random.default_rng(random_state)
+        return sample_trajectories(self._learned(), task, self._step(dt), count, rng, sensor_noise)
+
+    def save(self, path: str | Path, detector: FailureDetector | None = None) -> None:
+        """Write a model file, atomically, with the detector if given."""
+        PrimitiveLibrary({"": self}).save(path, detector)
+
+    def _learned(self) -> Primitive:
+        if not hasattr(self, "primitive_"):
+            raise NotFittedError("a learned primitive", "one that was not fitted", "Call fit(demonstrations) first.")
+        return self.primitive_
+
+    def _step(self, dt: float | None) -> float:
+        return self._learned().dt if dt is None else check_positive(dt, "dt", "seconds", MILLISECONDS_HINT)
+
+    def _recording(self, observations: Recording, dt: float | None) -> Demonstration:
+        return as_demonstrations([observations], self._step(dt))[0]
+
+
+class PrimitiveLibrary(Mapping[str, ProbabilisticDMP]):
+    """Learned movements by label.
+
+    Parameters
+    ----------
+    primitives : learned ProbabilisticDMPs by label.
+    """
+
+    def __init__(self, primitives: Mapping[str, ProbabilisticDMP]) -> None:
+        if not primitives:
+            raise InputError("at least one primitive", "an empty mapping")
+        self._primitives = dict(primitives)
+
+    @classmethod
+    def fit(cls, demonstrations: Mapping[str, Recordings], dt: float | None = None, **parameters: Any) -> Self:
+        """Learn one primitive per label.
+
+        Parameters
+        ----------
+        demonstrations : by label, as for `ProbabilisticDMP.fit`.
+        parameters : constructor arguments of ProbabilisticDMP.
+        """
+        return cls({label: ProbabilisticDMP(**parameters).fit(items, dt) for label, items in demonstrations.items()})
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read all primitives of a model file."""
+        contents = read_model(path)
+        return cls({label: _restored(contents, label) for label in contents.primitives})
+
+    def save(self, path: str | Path, detector: FailureDetector | None = None) -> None:
+        """Write one model file, atomically, with the detector if given."""
+        contents = ModelContents(
+            primitives={label: p._learned() for label, p in self.items()},
+            settings={label: p.get_params() for label, p in self.items()},
+            detector=detector.state() if detector is not None else None,
+        )
+        write_model(path, contents)
+
+    def __getitem__(self, label: str) -> ProbabilisticDMP:
+        if label not in self._primitives:
+            raise InputError(f"a label of the library, one of {sorted(self)}", repr(label))
+        return self._primitives[label]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._primitives)
+
+    def __len__(self) -> int:
+        return len(self._primitives)
+
+    def __repr__(self) -> str:
+        return f"<PrimitiveLibrary: {', '.join(map(repr, self))}>"
+
+
+def load(path: str | Path, label: str | None = None) -> ProbabilisticDMP:
+    """Read a primitive from a model file.
+
+    Parameters
+    ----------
+    label : which one, if the file holds several; `PrimitiveLibrary.load` reads them all.
+
+    Raises
+    ------
+    ModelFileError
+        If the file is missing, damaged, or not a model file.
+    """
+    contents = read_model(path)
+    labels = list(contents.primitives)
+    chosen = labels[0] if label is None and len(labels) == 1 else label
+    if chosen not in contents.primitives:
+        raise InputError(f"a label of the file, one of {sorted(labels)}", repr(label))
+    return _restored(contents, str(chosen))
+
+
+def load_detector(path: str | Path) -> FailureDetector | None:
+    """Read the detector of a model file; None if it was saved without one."""
+    contents = read_model(path)
+    return None if contents.detector is None else FailureDetector.from_state(contents.detector, contents.primitives)
+
+
+def _restored(contents: ModelContents, label: str) -> ProbabilisticDMP:
+    """The estimator as it was after fitting, but for its fit report."""
+    estimator = ProbabilisticDMP(**contents.settings[label])
+    estimator.primitive_, estimator.fit_report_ = contents.primitives[label], None
+    return estimator

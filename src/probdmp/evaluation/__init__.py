@@ -1,0 +1,19 @@
+"""The paper's experiment on any labelled demonstrations: protocol, rates with intervals, latency."""
+
+from probdmp.evaluation.experiment import Evaluation, Experiment, evaluate
+from probdmp.evaluation.metrics import Rate, rate_of
+from probdmp.evaluation.outcomes import READINGS, Outcome, Reading, Summary, published_summary, summarize
+
+__all__ = [
+    "READINGS",
+    "Evaluation",
+    "Experiment",
+    "Outcome",
+    "Rate",
+    "Reading",
+    "Summary",
+    "evaluate",
+    "published_summary",
+    "rate_of",
+    "summarize",
+]

@@ -1,0 +1,29 @@
+"""Running a primitive: rollout, tracking, smoothing and sampling of recordings, online execution."""
+
+from probdmp.execution.online import ExecutionStep, Judgement, Monitor, Observed, OnlineExecution
+from probdmp.execution.recordings import (
+    filter_recordings,
+    score_recordings,
+    smooth_recording,
+    task_of_recording,
+    track_recording,
+)
+from probdmp.execution.rollout import roll_out, sample_trajectories
+from probdmp.execution.trajectory import GaussianTrajectory, TrackedTrajectory
+
+__all__ = [
+    "ExecutionStep",
+    "GaussianTrajectory",
+    "Judgement",
+    "Monitor",
+    "Observed",
+    "OnlineExecution",
+    "TrackedTrajectory",
+    "filter_recordings",
+    "roll_out",
+    "sample_trajectories",
+    "score_recordings",
+    "smooth_recording",
+    "task_of_recording",
+    "track_recording",
+]

@@ -1,0 +1,112 @@
+"""What a primitive says about recorded executions: filter, smoother, likelihood.
+
+The task of a recording is what its user says it was; what is not said is read off the recording (its first row and its length)
+or taken as learned (the goal). Source: Meier & Schaal 2016, Algorithm 2.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from probdmp.checks import FloatArray
+from probdmp.demonstrations import Demonstration, stack_positions
+from probdmp.dmp import Primitive, Task, linear_gaussian_model, task_for
+from probdmp.errors import InputError
+from probdmp.execution.trajectory import GaussianTrajectory, TrackedTrajectory
+from probdmp.gaussian import FilteredSequence, filter_sequence, smooth_sequence
+
+__all__ = ["filter_recordings", "score_recordings", "smooth_recording", "task_of_recording", "track_recording"]
+
+BATCH_SIZE = 256
+"""Recordings that are filtered side by side; more would only cost memory."""
+
+
+def task_of_recording(
+    primitive: Primitive,
+    recording: Demonstration,
+    start: ArrayLike | None = None,
+    goal: ArrayLike | None = None,
+    duration: float | None = None,
+    start_velocity: ArrayLike | None = None,
+) -> Task:
+    """The task of a recorded execution.
+
+    Parameters
+    ----------
+    start : (D,) array, data units; the first row of the recording unless given, as learned where that row is missing.
+    goal : (D,) array, data units; as learned unless given.
+    duration : seconds; the length of the recording unless given.
+    start_velocity : (D,) array, data units per second; as learned, with its variance, unless given.
+    """
+    if start is None:
+        first = recording.positions[0]
+        start = np.where(np.isnan(first), primitive.start, first)
+    return task_for(primitive, start, goal, recording.duration if duration is None else duration, start_velocity)
+
+
+def track_recording(primitive: Primitive, task: Task, recording: Demonstration) -> TrackedTrajectory:
+    """Kalman filter over a recorded execution; NaN marks what was not measured, and is predicted."""
+    forward = filter_recordings(primitive, [task], [recording])
+    contributions = forward.log_likelihoods[:, 0]
+    return TrackedTrajectory(
+        times=recording.times,
+        means=forward.filtered.means[:, 0],
+        covariances=forward.filtered.covariances[:, 0],
+        names=primitive.names,
+        units=primitive.units,
+        log_likelihoods=contributions.sum(axis=-1),
+        contributions=contributions,
+        innovations=forward.innovations[:, 0, :, 0],
+        innovation_variances=forward.innovation_covariances[:, 0, :, 0, 0],
+    )
+
+
+def smooth_recording(primitive: Primitive, task: Task, recording: Demonstration) -> GaussianTrajectory:
+    """The state at each time given the whole recording, before and after."""
+    _check_recordings(primitive, [recording])
+    model = linear_gaussian_model(primitive, task, recording.dt, recording.n_samples)
+    smoothed = smooth_sequence(model, recording.positions[..., None])
+    return GaussianTrajectory(recording.times, *smoothed, primitive.names, primitive.units)
+
+
+def score_recordings(primitive: Primitive, tasks: Sequence[Task], recordings: Sequence[Demonstration]) -> FloatArray:
+    """Total log-likelihood of each recording given its task, (N,) array, nats."""
+    batches = range(0, len(recordings), BATCH_SIZE)
+    return np.concatenate(
+        [
+            filter_recordings(primitive, tasks[i : i + BATCH_SIZE], recordings[i : i + BATCH_SIZE]).log_likelihoods.sum((0, -1))
+            for i in batches
+        ]
+    )
+
+
+def filter_recordings(primitive: Primitive, tasks: Sequence[Task], recordings: Sequence[Demonstration]) -> FilteredSequence:
+    """Kalman filter over N recordings side by side: arrays (T, N, D, …); after the end of a recording nothing is seen."""
+    _check_recordings(primitive, recordings)
+    observed = stack_positions(recordings)
+    dts = np.array([r.dt for r in recordings])
+    model = linear_gaussian_model(primitive, _stack_tasks(tasks), dts, len(observed))
+    return filter_sequence(model, observed[..., None])
+
+
+def _stack_tasks(tasks: Sequence[Task]) -> Task:
+    """Single tasks as one batch. Either all or none give a start velocity."""
+    velocities = [t.start_velocity for t in tasks if t.start_velocity is not None]
+    return Task(
+        np.stack([t.start for t in tasks]),
+        np.stack([t.goal for t in tasks]),
+        np.stack([t.duration for t in tasks]),
+        np.stack(velocities) if velocities else None,
+    )
+
+
+def _check_recordings(primitive: Primitive, recordings: Sequence[Demonstration]) -> None:
+    """Refuse recordings of other degrees of freedom than the primitive has."""
+    for recording in recordings:
+        if recording.n_dof != primitive.n_dof:
+            raise InputError(
+                f"recordings of {primitive.n_dof} degrees of freedom ({', '.join(primitive.names)})",
+                f"one with {recording.n_dof} ({', '.join(recording.names)})",
+                "Time goes first: (T, D).",
+            )

@@ -1,0 +1,42 @@
+"""Feedforward use of a primitive: its mean with uncertainty, and draws from it. Source: Meier & Schaal 2016, Algorithm 1."""
+
+import numpy as np
+
+from probdmp.checks import FloatArray
+from probdmp.dmp import Primitive, Task, linear_gaussian_model, step_count
+from probdmp.execution.trajectory import POSITION, GaussianTrajectory
+from probdmp.gaussian import filter_sequence, sample_sequences
+
+__all__ = ["roll_out", "sample_trajectories"]
+
+
+def roll_out(primitive: Primitive, task: Task, dt: float) -> GaussianTrajectory:
+    """The movement as planned, from its start to the end of its duration: filtering without observations.
+
+    Parameters
+    ----------
+    dt : seconds between states.
+    """
+    n_steps = step_count(float(task.duration), dt)
+    rolled = filter_sequence(linear_gaussian_model(primitive, task, dt, n_steps)).filtered
+    return GaussianTrajectory(
+        np.arange(n_steps, dtype=np.float64) * dt, rolled.means, rolled.covariances, primitive.names, primitive.units
+    )
+
+
+def sample_trajectories(
+    primitive: Primitive, task: Task, dt: float, n_samples: int, rng: np.random.Generator, sensor_noise: bool
+) -> list[FloatArray]:
+    """Draw executions from the model.
+
+    Parameters
+    ----------
+    sensor_noise : whether positions are as a sensor would record them, or as they are.
+
+    Returns
+    -------
+    n_samples arrays (T, D), data units.
+    """
+    model = linear_gaussian_model(primitive, task, dt, step_count(float(task.duration), dt))
+    states, observations = sample_sequences(model, n_samples, rng)
+    return list(observations[..., 0] if sensor_noise else states[..., POSITION])

@@ -1,0 +1,161 @@
+"""The Kalman filter: one prediction, one update, and the loop over them.
+
+    predict:  m- = A m + B u,   V- = A V A^T + Q
+    update:   e = o - C m-,  S = C V- C^T + R,  K = V- C^T S^-1,
+              m = m- + K e,  V = (I - K C) V- (I - K C)^T + K R K^T           (Joseph form)
+    likelihood of a step: ln N(o; C m-, S), the density of the PREDICTION, never of the update
+
+The same `predict` and `update` serve the recorded and the online case; a rollout is the loop with nothing observed.
+Source: Meier & Schaal 2016, Algorithms 1 and 2; Bishop, Pattern Recognition and Machine Learning, section 13.3.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from probdmp.checks import FloatArray
+from probdmp.gaussian.density import gaussian_log_density, invert_covariance
+from probdmp.gaussian.model import GaussianSequence, LinearGaussianModel
+
+__all__ = ["FilteredSequence", "Update", "filter_sequence", "predict", "update"]
+
+
+class Update(NamedTuple):
+    """The state after one observation, and what the observation said."""
+
+    mean: FloatArray
+    """m, (*batch, n)."""
+    covariance: FloatArray
+    """V, (*batch, n, n)."""
+    innovation: FloatArray
+    """e, (*batch, O); NaN where not seen."""
+    innovation_covariance: FloatArray
+    """S, (*batch, O, O), whether seen or not."""
+    score: FloatArray
+    """C^T S^-1 e, (*batch, n): the gradient of the log-likelihood with respect to m-."""
+    information: FloatArray
+    """C^T S^-1 C, (*batch, n, n)."""
+    retention: FloatArray
+    """I - K C, (*batch, n, n): what the update leaves of an error in m-."""
+    log_likelihood: FloatArray
+    """ln N(o; C m-, S) over the sensors that were seen, (*batch); 0 where none was."""
+
+
+class FilteredSequence(NamedTuple):
+    """What the filter says about a recording."""
+
+    filtered: GaussianSequence
+    """The state given the observations up to and including each time."""
+    innovations: FloatArray
+    """(T, *batch, O) array; NaN where not seen."""
+    innovation_covariances: FloatArray
+    """(T, *batch, O, O) array."""
+    log_likelihoods: FloatArray
+    """(T, *batch) array, nats: density of what was seen at each time given the past."""
+    scores: FloatArray
+    """(T, *batch, n) array, see `Update`."""
+    informations: FloatArray
+    """(T, *batch, n, n) array, see `Update`."""
+    retentions: FloatArray
+    """(T, *batch, n, n) array, see `Update`."""
+
+
+def predict(
+    mean: FloatArray, covariance: FloatArray, transition: FloatArray, drift: FloatArray, process_covariance: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """One step ahead without an observation.
+
+    Parameters
+    ----------
+    mean, covariance : (*batch, n) and (*batch, n, n) arrays, the state at t-1.
+    transition : A, (*batch, n, n).
+    drift : B u[t-1], (*batch, n).
+    process_covariance : Q[t-1], (*batch, n, n).
+
+    Returns
+    -------
+    Mean and covariance of the state at t.
+    """
+    # Alg. 1, lines 3-4; Alg. 2, lines 3-4
+    return np.matmul(transition, mean[..., None])[..., 0] + drift, transition @ covariance @ transition.mT + process_covariance
+
+
+def update(
+    mean: FloatArray,
+    covariance: FloatArray,
+    observation: FloatArray,
+    observation_matrix: FloatArray,
+    observation_covariance: FloatArray,
+) -> Update:
+    """Take one observation into account.
+
+    Parameters
+    ----------
+    mean, covariance : (*batch, n) and (*batch, n, n) arrays, the predicted state.
+    observation : (*batch, O) array; NaN marks a sensor that was not seen, and nothing changes for its sake.
+    observation_matrix : C, (*batch, O, n).
+    observation_covariance : R, (*batch, O, O).
+    """
+    seen = ~np.isnan(observation)
+    innovation = observation - np.matmul(observation_matrix, mean[..., None])[..., 0]
+    innovation_covariance = observation_matrix @ covariance @ observation_matrix.mT + observation_covariance  # Alg. 2, l. 5
+    c, r, s = observation_matrix, observation_covariance, innovation_covariance
+    if not seen.all():
+        # A sensor that was not seen gets a zero row in C and a unit variance: no gain, no density.
+        both, identity = seen[..., :, None] & seen[..., None, :], np.eye(seen.shape[-1])
+        c, r, s = np.where(seen[..., None], c, 0.0), np.where(both, r, identity), np.where(both, s, identity)
+    precision, log_determinant = invert_covariance(s)
+    residual = np.where(seen, innovation, 0.0)
+    weighted = c.mT @ precision
+    gain = covariance @ weighted  # Alg. 2, line 6: K = V C^T S^-1
+    retention = np.eye(mean.shape[-1]) - gain @ c
+    updated = retention @ covariance @ retention.mT + gain @ r @ gain.mT  # Alg. 2, line 8, in Joseph form
+    return Update(
+        mean + np.matmul(gain, residual[..., None])[..., 0],  # Alg. 2, line 7
+        (updated + updated.mT) / 2,
+        innovation,
+        innovation_covariance,
+        np.matmul(weighted, residual[..., None])[..., 0],
+        weighted @ c,
+        retention,
+        gaussian_log_density(residual, precision, log_determinant, np.sum(seen, axis=-1).astype(np.float64)),
+    )
+
+
+def filter_sequence(model: LinearGaussianModel, observations: FloatArray | None = None) -> FilteredSequence:
+    """Kalman filter over a recording; without observations, a rollout with its uncertainty.
+
+    Parameters
+    ----------
+    observations : (T, *batch, O) array; NaN marks what was not seen. None: nothing was seen at all.
+
+    Raises
+    ------
+    InputError
+        If the shape of `observations` does not fit the model, or R is not positive definite.
+    """
+    batch, n_sensors, n_states = model.batch_shape, *model.observation_matrix.shape[-2:]
+    if observations is None:
+        observed = np.full((model.n_steps, *batch, n_sensors), np.nan)
+    else:
+        observed = model.check_observations(observations)
+    drifts, process_covariances = model.drifts(), model.process_covariances()
+    mean = np.broadcast_to(model.initial_mean, (*batch, n_states))
+    covariance = np.broadcast_to(model.initial_covariance, (*batch, n_states, n_states))
+    steps = []
+    for t in range(model.n_steps):
+        if t > 0:  # u[t-1] drives s[t-1] to s[t]
+            mean, covariance = predict(mean, covariance, model.transition, drifts[t - 1], process_covariances[t - 1])
+        step = update(mean, covariance, observed[t], model.observation_matrix, model.observation_covariance)
+        mean, covariance = step.mean, step.covariance
+        steps.append(step)
+    stacked = Update(*(np.stack(column) for column in zip(*steps, strict=True)))
+    return FilteredSequence(
+        GaussianSequence(stacked.mean, stacked.covariance),
+        stacked.innovation,
+        stacked.innovation_covariance,
+        stacked.log_likelihood,
+        stacked.score,
+        stacked.information,
+        stacked.retention,
+    )

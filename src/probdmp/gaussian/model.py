@@ -1,0 +1,108 @@
+"""A linear system driven by uncertain inputs and seen through noisy sensors.
+
+    s[t] = A s[t-1] + B (u[t-1] + e[t-1]),   e[t] ~ N(0, U[t])        t = 1 .. T-1
+    o[t] = C s[t] + v[t],                    v[t] ~ N(0, R)           t = 0 .. T-1
+    s[0] ~ N(m0, V0)
+
+Index convention: u[t-1] and U[t-1] drive s[t-1] to s[t]. There are T states and observations and T-1 inputs; the first
+state has no input before it. The process noise is Q[t] = B U[t] B^T: with one input it has rank one, and nothing here
+ever inverts it.
+
+Every array may carry leading batch axes, written `*batch`: independent systems that are computed side by side, such as
+the degrees of freedom of a robot or the executions of a data set. Time comes first in whatever depends on time.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from probdmp.checks import FloatArray, check_array
+from probdmp.errors import InputError
+
+__all__ = ["GaussianSequence", "LinearGaussianModel"]
+
+
+class GaussianSequence(NamedTuple):
+    """A Gaussian over the state at each time."""
+
+    means: FloatArray
+    """(T, *batch, n) array."""
+    covariances: FloatArray
+    """(T, *batch, n, n) array, symmetric."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinearGaussianModel:
+    """A controlled linear-Gaussian system; the equations and the index convention are in the module's docstring.
+
+    n is the number of states, m of inputs, O of sensors. Batch axes broadcast against each other.
+    """
+
+    transition: FloatArray
+    """A, (*batch, n, n)."""
+    input_matrix: FloatArray
+    """B, (*batch, n, m)."""
+    inputs: FloatArray
+    """u, (T-1, *batch, m); `inputs[t-1]` drives state t-1 to state t."""
+    input_covariances: FloatArray
+    """U, (T-1, *batch, m, m), positive semi-definite."""
+    observation_matrix: FloatArray
+    """C, (*batch, O, n)."""
+    observation_covariance: FloatArray
+    """R, (*batch, O, O), positive definite."""
+    initial_mean: FloatArray
+    """m0, (*batch, n)."""
+    initial_covariance: FloatArray
+    """V0, (*batch, n, n), positive semi-definite; zero for a known start."""
+
+    @property
+    def n_steps(self) -> int:
+        """T, the number of states: one more than there are inputs."""
+        return len(self.inputs) + 1
+
+    @property
+    def batch_shape(self) -> tuple[int, ...]:
+        """Shape of the batch axes."""
+        return np.broadcast_shapes(
+            self.transition.shape[:-2],
+            self.input_matrix.shape[:-2],
+            self.inputs.shape[1:-1],
+            self.input_covariances.shape[1:-2],
+            self.observation_matrix.shape[:-2],
+            self.observation_covariance.shape[:-2],
+            self.initial_mean.shape[:-1],
+            self.initial_covariance.shape[:-2],
+        )
+
+    def drifts(self) -> FloatArray:
+        """B u[t] for every transition, (T-1, *batch, n)."""
+        return np.matmul(self.input_matrix, self.inputs[..., None])[..., 0]
+
+    def process_covariances(self) -> FloatArray:
+        """Q[t] = B U[t] B^T for every transition, (T-1, *batch, n, n)."""
+        b = self.input_matrix
+        return b @ self.input_covariances @ b.mT
+
+    def check_observations(self, observations: FloatArray) -> FloatArray:
+        """Observations as a (T, *batch, O) array in which NaN marks what was not seen."""
+        n_sensors = self.observation_matrix.shape[-2]
+        shape = (self.n_steps, *self.batch_shape, n_sensors)
+        array = check_array(
+            observations,
+            "observations",
+            shape,
+            missing=True,
+            hint=f"T = {self.n_steps} times first, then the batch, then {n_sensors} sensors.",
+        )
+        self.check_sensors()
+        return array
+
+    def check_sensors(self) -> None:
+        """Refuse an observation covariance that is not positive definite: the filter divides by it."""
+        if np.any(np.linalg.eigvalsh(self.observation_covariance) <= 0):
+            raise InputError(
+                "observation_covariance positive definite",
+                "an eigenvalue <= 0",
+                "Give every sensor a variance above zero, if only a tiny one.",
+            )

@@ -1,0 +1,44 @@
+"""The fixed-interval smoother: the state at each time given the whole recording.
+
+    l[T-1] = 0, L[T-1] = 0;  backwards:
+    l[t-1] = A^T (C^T S^-1 e + (I - K C)^T l[t]),    L[t-1] = A^T (C^T S^-1 C + (I - K C)^T L[t] (I - K C)) A   at t
+    smoothed mean = m + V l,   smoothed covariance = V - V L V                 (m, V filtered)
+
+Only S is ever inverted, so a rank-one process noise and an exactly known start need no jitter.
+Source: Bierman, Fixed interval smoothing with discrete measurements, Int. J. Control 18 (1973), the modified
+Bryson-Frazier form; Durbin & Koopman, Time Series Analysis by State Space Methods, section 4.4.
+"""
+
+import numpy as np
+
+from probdmp.checks import FloatArray
+from probdmp.gaussian.filtering import FilteredSequence, filter_sequence
+from probdmp.gaussian.model import GaussianSequence, LinearGaussianModel
+
+__all__ = ["smooth_filtered", "smooth_sequence"]
+
+
+def smooth_sequence(model: LinearGaussianModel, observations: FloatArray) -> GaussianSequence:
+    """The state at each time given all observations, before and after.
+
+    Parameters
+    ----------
+    observations : (T, *batch, O) array; NaN marks what was not seen.
+    """
+    return smooth_filtered(model, filter_sequence(model, observations))
+
+
+def smooth_filtered(model: LinearGaussianModel, forward: FilteredSequence) -> GaussianSequence:
+    """The backward pass alone, for a recording that has been filtered with the same model."""
+    a, (means, covariances) = model.transition, forward.filtered
+    smoothed_means, smoothed_covariances = means.copy(), covariances.copy()
+    score, information = np.zeros_like(means[0]), np.zeros_like(covariances[0])
+    for t in range(model.n_steps - 1, 0, -1):
+        kept = forward.retentions[t]
+        score = np.matmul(a.mT, (forward.scores[t] + np.matmul(kept.mT, score[..., None])[..., 0])[..., None])[..., 0]
+        information = a.mT @ (forward.informations[t] + kept.mT @ information @ kept) @ a
+        v = covariances[t - 1]
+        smoothed_means[t - 1] += np.matmul(v, score[..., None])[..., 0]
+        correction = v @ information @ v
+        smoothed_covariances[t - 1] -= (correction + correction.mT) / 2
+    return GaussianSequence(smoothed_means, smoothed_covariances)

@@ -1,0 +1,18 @@
+"""Files to values and back: demonstrations in several formats, models in one that can be trusted."""
+
+from probdmp.io.formats import read_demonstrations, write_demonstrations
+from probdmp.io.model_contents import ModelContents
+from probdmp.io.model_file import decode_model, encode_model, read_model, write_model
+from probdmp.io.npz import read_npz, write_npz
+
+__all__ = [
+    "ModelContents",
+    "decode_model",
+    "encode_model",
+    "read_demonstrations",
+    "read_model",
+    "read_npz",
+    "write_demonstrations",
+    "write_model",
+    "write_npz",
+]

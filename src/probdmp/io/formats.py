@@ -1,0 +1,62 @@
+"""Which module reads and writes which file, by suffix."""
+
+import os
+from collections.abc import Callable, Sequence
+from pathlib import PurePath
+from typing import NamedTuple
+
+from probdmp.demonstrations import Demonstration
+from probdmp.errors import InputError
+from probdmp.io.npz import read_npz, write_npz
+
+__all__ = ["FORMATS", "Format", "read_demonstrations", "write_demonstrations"]
+
+
+class Format(NamedTuple):
+    """How a kind of file becomes demonstrations, and back."""
+
+    read: Callable[[str | os.PathLike[str], str | None, Sequence[str] | None], list[Demonstration]]
+    write: Callable[[str | os.PathLike[str], Sequence[Demonstration]], None]
+
+
+FORMATS = {
+    ".npz": Format(read_npz, write_npz),
+}
+
+
+def read_demonstrations(
+    path: str | os.PathLike[str], label: str | None = None, columns: Sequence[str] | None = None
+) -> list[Demonstration]:
+    """Demonstrations from a file of any known format.
+
+    Parameters
+    ----------
+    label : keep only the demonstrations with this label.
+    columns : names of the columns that are positions, in the order wanted; by default x, y, z and q….
+
+    Raises
+    ------
+    DataFileError
+        If the file is damaged, hostile, or does not say which columns are positions.
+    InputError, InputTypeError
+        If the suffix is unknown, no demonstration has the label, or the file has not the columns.
+    """
+    return _format(path).read(path, label, columns)
+
+
+def write_demonstrations(path: str | os.PathLike[str], demonstrations: Sequence[Demonstration]) -> None:
+    """Write demonstrations in the format that the suffix names, replacing the file in one step.
+
+    Raises
+    ------
+    InputError, InputTypeError
+        If the suffix is unknown, or the format cannot hold the demonstrations.
+    """
+    _format(path).write(path, demonstrations)
+
+
+def _format(path: str | os.PathLike[str]) -> Format:
+    suffix = PurePath(path).suffix.lower()
+    if suffix not in FORMATS:
+        raise InputError(f"a file name that ends in {' or '.join(FORMATS)}", repr(os.fspath(path)))
+    return FORMATS[suffix]

@@ -1,0 +1,12 @@
+"""From demonstrations to a primitive: forcing targets, Bayesian regression, observation noise by EM."""
+
+from probdmp.learning.fit import FitReport, LearningOptions, fit_primitive
+from probdmp.learning.observation_noise import ObservationNoise, estimate_observation_noise
+
+__all__ = [
+    "FitReport",
+    "LearningOptions",
+    "ObservationNoise",
+    "estimate_observation_noise",
+    "fit_primitive",
+]
