@@ -3,6 +3,7 @@
 Code behind the boundary assumes what was checked here and checks nothing again.
 """
 
+import sys
 from collections.abc import Collection, Sequence
 
 import numpy as np
@@ -57,7 +58,8 @@ def check_array(
     InputError
         If the shape differs, a value is NaN (unless `missing`) or infinite, or larger than `LARGEST_MAGNITUDE`.
     """
-    if isinstance(value, np.ma.MaskedArray) and value.dtype.kind in "fiu":
+    # Without numpy.ma loaded there is no masked array, and loading it would double the time that probdmp takes.
+    if "numpy.ma" in sys.modules and isinstance(value, np.ma.MaskedArray) and value.dtype.kind in "fiu":
         value = np.ma.filled(value.astype(np.float64), np.nan)
     try:
         raw = np.asarray(value)

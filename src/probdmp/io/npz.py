@@ -47,7 +47,7 @@ def read_npz(
     names = _position_columns(recordings, columns, name)
     counts = Counter(recordings.labels)
     if label is not None and label not in counts:
-        present = listing(f"{known} ({count})" for known, count in counts.items())
+        present = listing(f"{known!r} ({count})" for known, count in counts.items())
         raise InputError(f"label to be one of those in {name}: {present}", repr(label))
     wanted = [i for i, other in enumerate(recordings.labels) if label in (None, other)]
     return [_demonstration(recordings, i, names, name) for i in wanted]
@@ -67,7 +67,7 @@ def write_npz(path: str | os.PathLike[str], demonstrations: Sequence[Demonstrati
     if len(set(columns)) < len(columns) or len(columns) > MOST_COLUMNS or len(checked) > MOST_DEMONSTRATIONS:
         raise InputError(
             f"at most {MOST_DEMONSTRATIONS} demonstrations and {MOST_COLUMNS} columns with different names",
-            f"{len(checked)} demonstrations with columns {listing(columns)}",
+            f"{len(checked)} demonstrations with columns {listing(map(repr, columns))}",
         )
     tables = [np.column_stack([d.positions, *(d.channels[name] for name in first.channels)]) for d in checked]
     arrays = {
@@ -89,7 +89,7 @@ def write_npz(path: str | os.PathLike[str], demonstrations: Sequence[Demonstrati
 
 
 def _position_columns(recordings: Recordings, columns: Sequence[str] | None, name: str) -> tuple[str, ...]:
-    known = listing(recordings.columns)
+    known = listing(map(repr, recordings.columns))
     if columns is None:
         chosen = recordings.positions or positions_by_name(recordings.columns)
         if not chosen:

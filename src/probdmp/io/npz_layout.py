@@ -12,6 +12,7 @@ Columns named x, y, z or q… are positions; the others are sensor channels.
 """
 
 import re
+import sys
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
@@ -70,19 +71,19 @@ def check_recordings(arrays: dict[str, NDArray[Any]], name: str) -> Recordings:
     for key, (kinds, n_axes) in LAYOUT.items():
         expected = f"array {key!r} of {KINDS[kinds]} with {n_axes} axes in {name}"
         if key not in arrays:
-            raise DataFileError(expected, f"only the arrays {listing(sorted(arrays))}", HINT)
+            raise DataFileError(expected, f"only the arrays {listing(map(repr, sorted(arrays)))}", HINT)
         array = arrays[key]
         wide = kinds != "U" and array.dtype.itemsize > WIDEST_NUMBER
         if array.dtype.kind not in kinds or array.ndim != n_axes or wide:
             raise DataFileError(expected, f"dtype {array.dtype} and shape {array.shape}", HINT)
     _check_lengths(arrays, name)
-    try:
-        recordings = Recordings(data=arrays["data"], **{key: arrays[key].tolist() for key in LAYOUT if key != "data"})
-    except ValueError as error:
-        raise DataFileError(f"text in {name}", str(error), HINT) from error
+    for key, (kinds, _) in LAYOUT.items():
+        if kinds == "U" and np.any(_code_points(arrays[key]) > sys.maxunicode):
+            raise DataFileError(f"array {key!r} of text in {name}", "a number that is no character", HINT)
+    recordings = Recordings(data=arrays["data"], **{key: arrays[key].tolist() for key in LAYOUT if key != "data"})
     for key, columns in (("columns", recordings.columns), ("positions", recordings.positions)):
         if len(set(columns)) < len(columns) or not set(columns) <= set(recordings.columns):
-            raise DataFileError(f"different names of columns as {key!r} in {name}", listing(columns), HINT)
+            raise DataFileError(f"different names of columns as {key!r} in {name}", listing(map(repr, columns)), HINT)
     return recordings
 
 
@@ -91,10 +92,10 @@ def positions_by_name(columns: Iterable[str]) -> list[str]:
     return [column for column in columns if re.fullmatch(r"x|y|z|q\w*", column)]
 
 
-def listing(names: Iterable[str], most: int = 40) -> str:
-    """Names for a message, the first few of many."""
-    different = list(dict.fromkeys(names))
-    return ", ".join(map(repr, different[:most])) + (f" and {len(different) - most} more" if len(different) > most else "")
+def listing(items: Iterable[object], most: int = 40) -> str:
+    """Items for a message, the first few of many."""
+    texts = list(map(str, items))
+    return ", ".join(texts[:most]) + (f" and {len(texts) - most} more" if len(texts) > most else "")
 
 
 def _check_lengths(arrays: dict[str, NDArray[Any]], name: str) -> None:
@@ -108,3 +109,8 @@ def _check_lengths(arrays: dict[str, NDArray[Any]], name: str) -> None:
     if len(columns) != data.shape[1] or max(len(columns), len(arrays["positions"])) > MOST_COLUMNS:
         expected = f"one name for each of the {data.shape[1]} columns of data, at most {MOST_COLUMNS}, in {name}"
         raise DataFileError(expected, f"{len(columns)} names", HINT)
+
+
+def _code_points(text: NDArray[Any]) -> NDArray[np.uint32]:
+    """Characters as numbers: NumPy makes invalid ones into strings unchecked."""
+    return np.frombuffer(text.tobytes(), np.dtype(np.uint32).newbyteorder(text.dtype.byteorder))

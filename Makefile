@@ -1,0 +1,38 @@
+# Everything that needs an environment makes it: `make demo` and `make test` work on a fresh clone with Python >= 3.11.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+
+.PHONY: demo test test-slow lint types figures clean
+
+demo: $(VENV)/.demo
+	$(BIN)/probdmp demo
+
+test: $(VENV)/.test
+	$(BIN)/python -m pytest -n auto
+
+test-slow: $(VENV)/.test
+	$(BIN)/python -m pytest -n auto -m slow
+
+lint: $(VENV)/.dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: $(VENV)/.dev
+	$(BIN)/mypy
+
+# Every picture in the documentation.
+figures: $(VENV)/.demo
+	$(BIN)/python docs/figures.py
+
+clean:
+	rm -rf $(VENV) build src/*.egg-info report.html
+
+# A stamp per set of extras: installed again only when pyproject.toml changes.
+$(VENV)/.demo: EXTRA := plot
+$(VENV)/.test: EXTRA := test
+$(VENV)/.dev: EXTRA := dev
+$(VENV)/.%: pyproject.toml
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[$(EXTRA)]'
+	touch $@
