@@ -11,8 +11,8 @@ from probdmp.checks import FloatArray, check_choice, check_count, check_positive
 from probdmp.demonstrations import Demonstration, as_demonstrations
 from probdmp.demonstrations.demonstration import MILLISECONDS_HINT
 from probdmp.detection import FailureDetector
-from probdmp.dmp import Configuration, Primitive, Task, task_for
-from probdmp.errors import InputError, NotFittedError
+from probdmp.dmp import PUBLISHED, Configuration, Primitive, Task, task_for
+from probdmp.errors import InputError, ModelFileError, NotFittedError
 from probdmp.execution import (
     GaussianTrajectory,
     OnlineExecution,
@@ -90,7 +90,8 @@ class ProbabilisticDMP:
         ----------
         forcing_noise : the paper does not say which; it speaks of a predictive distribution.
         """
-        return cls(n_basis, forcing_noise=forcing_noise, discretization="semi_implicit_euler", scaling="paper")
+        scheme, scaling = PUBLISHED.discretization, PUBLISHED.scaling
+        return cls(n_basis, forcing_noise=forcing_noise, discretization=scheme, scaling=scaling, alpha_z=PUBLISHED.alpha_z)
 
     def get_params(self) -> dict[str, Any]:
         """The constructor's arguments by name."""
@@ -263,7 +264,7 @@ class PrimitiveLibrary(Mapping[str, ProbabilisticDMP]):
         """Write one model file, atomically, with the detector if given."""
         contents = ModelContents(
             primitives={label: p._learned() for label, p in self.items()},
-            settings={label: p.get_params() for label, p in self.items()},
+            settings={label: _plain(p.get_params()) for label, p in self.items()},
             detector=detector.state() if detector is not None else None,
         )
         write_model(path, contents)
@@ -309,8 +310,18 @@ def load_detector(path: str | Path) -> FailureDetector | None:
     return None if contents.detector is None else FailureDetector.from_state(contents.detector, contents.primitives)
 
 
+def _plain(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Numbers of NumPy as numbers of Python, which a model file can hold."""
+    return {name: value.item() if isinstance(value, np.generic) else value for name, value in parameters.items()}
+
+
 def _restored(contents: ModelContents, label: str) -> ProbabilisticDMP:
     """The estimator as it was after fitting, but for its fit report."""
-    estimator = ProbabilisticDMP(**contents.settings[label])
+    try:
+        estimator = ProbabilisticDMP(**contents.settings[label])
+    except (KeyError, TypeError) as error:
+        raise ModelFileError(
+            f"settings of {label!r} that ProbabilisticDMP takes", str(error), "Learn and save the model again."
+        ) from error
     estimator.primitive_, estimator.fit_report_ = contents.primitives[label], None
     return estimator

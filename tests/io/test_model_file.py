@@ -230,7 +230,7 @@ def one_tensor_less(metadata, tensors):
         (rewritten("primitives", "a", "names", value=[{}]), "names and units as text"),
         (rewritten("primitives", "a", "dt", value=-1.0), r"dt > 0 in m\.probdmp, got -1"),
         (rewritten("primitives", "a", "dt", value=None), "dt > 0, one number"),
-        (rewritten("primitives", "a", "duration", value=10**400), "duration|numbers that fit"),
+        (rewritten("primitives", "a", "duration", value=10**400), r"duration > 0.* in m\.probdmp"),
         (rewritten("primitives", "a", "n_demonstrations", value=0.5), "n_demonstrations as a whole number"),
         (rewritten("primitives", "a", "configuration", value=[]), "a configuration"),
         (rewritten("primitives", "a", "configuration", "n_basis", value=10**9), "n_basis as a whole number from 1 to 1000"),

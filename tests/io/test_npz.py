@@ -46,7 +46,7 @@ def assert_same(some, others):
 
 
 @given(recordings_of_one_file())
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_round_trip_is_exact(folder, demonstrations):
     write_npz(folder / "round.npz", demonstrations)
     assert_same(read_npz(folder / "round.npz"), demonstrations)
@@ -244,7 +244,7 @@ def test_truncation_anywhere_is_refused(small, write):
 def test_mutations_are_refused_or_harmless(small, write):
     path, rng = write(small), np.random.default_rng(0)
     payload, original = path.read_bytes(), read_npz(path)
-    for position in rng.integers(0, len(payload), 2000):
+    for position in rng.integers(0, len(payload), 1000):
         mutated = bytearray(payload)
         mutated[position] ^= rng.integers(1, 256)
         path.write_bytes(mutated)
@@ -333,13 +333,13 @@ def test_zip_bomb_is_not_unpacked(tmp_path):
 
 @pytest.mark.parametrize("compression", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
 def test_compressions_that_cannot_be_bounded_are_refused(tmp_path, compression):
-    path = zipped(tmp_path / "f.npz", [("data.npy", bytes(2**24))], compression)
+    path = zipped(tmp_path / "f.npz", [("data.npy", bytes(2**22))], compression)
     assert_refused_cheaply(path, r"'data\.npy' in .* stored or deflated, got compression")
 
 
 def test_a_member_that_lies_about_its_size_stays_bounded(tmp_path):
-    path = zipped(tmp_path / "f.npz", [("data.npy", bytes(2**26))], zipfile.ZIP_DEFLATED)
-    path.write_bytes(path.read_bytes().replace(struct.pack("<I", 2**26), struct.pack("<I", 100)))
+    path = zipped(tmp_path / "f.npz", [("data.npy", bytes(2**24))], zipfile.ZIP_DEFLATED)
+    path.write_bytes(path.read_bytes().replace(struct.pack("<I", 2**24), struct.pack("<I", 100)))
     assert_refused_cheaply(path, r"undamaged \.npz archive.*Bad CRC")
 
 

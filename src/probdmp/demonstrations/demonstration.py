@@ -57,8 +57,10 @@ class Demonstration:
         names = tuple(self.names) or tuple(f"dof{i}" for i in range(n_dof))
         if len(names) != n_dof or len(set(names)) != n_dof or not all(isinstance(name, str) for name in names):
             raise InputError(f"{n_dof} different names, one per column", repr(names))
-        if not all(isinstance(text, str) for text in (self.label, self.units)):
-            raise InputTypeError("label and units as text", f"{self.label!r} and {self.units!r}")
+        if not all(isinstance(text, str) for text in (self.label, self.units, *self.channels)):
+            raise InputTypeError("label, units and channel names as text", f"{(self.label, self.units, *self.channels)!r}")
+        if not set(names).isdisjoint(self.channels):
+            raise InputError("channels named otherwise than the degrees of freedom", repr(sorted(self.channels)))
         channels = {
             name: frozen(check_array(values, f"channel {name!r}", (n_samples,), missing=True))
             for name, values in self.channels.items()

@@ -93,7 +93,7 @@ def synthetic_letters(
     seed: int = 0,
     letters: str = LETTERS,
     dt: float = 0.01,
-    variation: WriterVariation = WriterVariation(),  # noqa: B008 - frozen
+    variation: WriterVariation = WriterVariation(),
 ) -> list[Demonstration]:
     """Repetitions of handwritten letters, letter after letter.
 

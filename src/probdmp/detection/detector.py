@@ -6,14 +6,14 @@ from typing import Any, Protocol, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from probdmp.checks import FloatArray, check_choice
+from probdmp.checks import FloatArray, check_array, check_choice
 from probdmp.demonstrations import Demonstration, as_demonstrations
 from probdmp.detection.monitoring import LikelihoodMonitor, LikelihoodStatistic, replay
 from probdmp.detection.statistics import LIKELIHOODS
 from probdmp.detection.thresholds import PaperThreshold
 from probdmp.detection.verdict import Verdict
 from probdmp.dmp import Primitive, Task
-from probdmp.errors import InputError, NotFittedError
+from probdmp.errors import InputError, ModelFileError, NotFittedError
 from probdmp.execution import task_of_recording
 
 __all__ = ["FailureDetector"]
@@ -117,9 +117,15 @@ class FailureDetector:
     @classmethod
     def from_state(cls, state: Mapping[str, Any], primitives: Mapping[str, Primitive]) -> Self:
         """A fitted detector from a model file: its state and the primitives it was fitted to, by label."""
-        detector = cls(rule=state["rule"], likelihood=state["likelihood"])
+        if set(state) != {"rule", "likelihood", "minima"} or not isinstance(state["minima"], Mapping):
+            raise ModelFileError("a detector with rule, likelihood and minima", str(sorted(state)), "Fit and save it again.")
+        detector = cls(
+            rule=check_choice(state["rule"], "rule", RULES),
+            likelihood=check_choice(state["likelihood"], "likelihood", LIKELIHOODS),
+        )
+        minima = {identity: float(check_array(minimum, "minimum", ())) for identity, minimum in state["minima"].items()}
         detector.primitives_ = dict(primitives)
-        detector.thresholds_ = {identity: PaperThreshold(float(minimum)) for identity, minimum in state["minima"].items()}
+        detector.thresholds_ = {identity: PaperThreshold(minimum) for identity, minimum in minima.items()}
         return detector
 
     def _fitted_thresholds(self) -> dict[str, PaperThreshold]:

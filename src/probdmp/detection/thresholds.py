@@ -19,6 +19,11 @@ class PaperThreshold:
     minimum: float
     """Least value of the statistic over the training demonstrations, nats."""
 
+    @property
+    def level(self) -> float:
+        """The statistic below which an execution has failed, nats."""
+        return self.minimum - abs(self.minimum)
+
     def test_ratio(self, statistic: float) -> float:
         """How far below the minimum the statistic has fallen, in units of |minimum|; 0 where it has not."""
         shortfall = max(self.minimum - statistic, 0.0)

@@ -11,7 +11,7 @@ from probdmp.dmp.task import Task
 from probdmp.dmp.transformation_system import DISCRETIZATIONS
 from probdmp.errors import InputError, InputTypeError
 
-__all__ = ["FORCING_NOISES", "SCALINGS", "Configuration", "Primitive", "task_for"]
+__all__ = ["FORCING_NOISES", "PUBLISHED", "SCALINGS", "Configuration", "Primitive", "task_for"]
 
 SCALINGS = ("none", "paper")
 FORCING_NOISES = ("posterior", "predictive")
@@ -36,11 +36,15 @@ class Configuration:
     """`"posterior"`: the variance of the mean forcing term; `"predictive"`: with the regression noise 1 / beta."""
 
     def __post_init__(self) -> None:
-        check_count(self.n_basis, "n_basis", most=1000)
-        check_positive(self.alpha_z, "alpha_z")
+        object.__setattr__(self, "n_basis", check_count(self.n_basis, "n_basis", most=1000))
+        object.__setattr__(self, "alpha_z", check_positive(self.alpha_z, "alpha_z"))
         check_choice(self.discretization, "discretization", DISCRETIZATIONS)
         check_choice(self.scaling, "scaling", SCALINGS)
         check_choice(self.forcing_noise, "forcing_noise", FORCING_NOISES)
+
+
+PUBLISHED = Configuration(discretization="semi_implicit_euler", scaling="paper")
+"""The paper's choices; docs/paper.md says which it leaves open."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,9 +107,11 @@ class Primitive:
             _check_semidefinite(getattr(self, name), name)
         for name in ("duration", "dt", "phase_step"):
             object.__setattr__(self, name, check_positive(getattr(self, name), name))
-        check_count(self.n_demonstrations, "n_demonstrations")
-        if d < 1 or not all(isinstance(name, str) for name in self.names) or not isinstance(self.units, str):
-            raise InputTypeError("names and units as text, at least one name", f"{self.names!r}, {self.units!r}")
+        object.__setattr__(self, "n_demonstrations", check_count(self.n_demonstrations, "n_demonstrations"))
+        if not all(isinstance(text, str) for text in (*self.names, self.units)):
+            raise InputTypeError("names and units as text", f"{self.names!r}, {self.units!r}")
+        if d < 1 or len(set(self.names)) < d:
+            raise InputError("at least one name, all different", repr(self.names))
         object.__setattr__(self, "names", tuple(self.names))
 
     @property

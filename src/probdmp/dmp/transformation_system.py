@@ -26,7 +26,7 @@ import numpy as np
 from probdmp.checks import FloatArray
 from probdmp.errors import InputError
 
-__all__ = ["DISCRETIZATIONS", "Discretization", "DiscreteSystem", "spring_matrix"]
+__all__ = ["DISCRETIZATIONS", "DiscreteSystem", "Discretization", "spring_matrix"]
 
 STABILITY_LIMIT = float(np.sqrt(32) - 4)
 """Semi-implicit Euler is unstable for alpha_z tau dt beyond this, about 1.66."""

@@ -14,12 +14,12 @@ import numpy as np
 from probdmp.checks import check_choice, check_count
 from probdmp.demonstrations import FAULTS, Demonstration
 from probdmp.detection import FailureDetector, Verdict
-from probdmp.dmp import Configuration, Primitive, Task, task_for
+from probdmp.dmp import PUBLISHED, Configuration, Primitive, Task, task_for
 from probdmp.errors import InputError
 from probdmp.evaluation.outcomes import READINGS, Outcome, Reading, Summary, published_summary, summarize
 from probdmp.learning import LearningOptions, fit_primitive
 
-__all__ = ["DETECTORS", "TASKS", "Evaluation", "Experiment", "evaluate"]
+__all__ = ["DETECTORS", "TASKS", "Evaluation", "Experiment", "Trial", "draw_trial", "evaluate", "group_by_label"]
 
 DETECTORS = ("paper",)
 TASKS = ("known", "nominal")
@@ -44,7 +44,7 @@ class Experiment:
     and duration are as learned."""
     faults: tuple[str, ...] = ("hold",)
     """Names from `probdmp.demonstrations.FAULTS`."""
-    configuration: Configuration = Configuration(discretization="semi_implicit_euler", scaling="paper")
+    configuration: Configuration = PUBLISHED
     """How primitives are made; the paper's unless given. The forcing noise is that of each reading."""
 
     def __post_init__(self) -> None:
@@ -80,7 +80,7 @@ class Evaluation:
             **asdict(first),
             **summaries[first].as_dict(),
             "readings": [{**asdict(reading), **summary.as_dict()} for reading, summary in summaries.items()],
-            "by_class": {label: _counts(o) for label, o in _by_label(self.outcomes[first]).items()},
+            "by_class": {label: _counts(o) for label, o in group_by_label(self.outcomes[first]).items()},
             "published": published_summary().as_dict(),
         }
 
@@ -178,7 +178,7 @@ def _alarm(verdict: Verdict) -> float | None:
 
 
 def _classes(demonstrations: Sequence[Demonstration], needed: int) -> dict[str, list[Demonstration]]:
-    classes = _by_label(demonstrations)
+    classes = group_by_label(demonstrations)
     scarce = {label: len(members) for label, members in classes.items() if len(members) < needed}
     if scarce:
         raise InputError(
@@ -192,7 +192,8 @@ def _classes(demonstrations: Sequence[Demonstration], needed: int) -> dict[str, 
 Labelled = TypeVar("Labelled", Demonstration, Outcome)
 
 
-def _by_label(items: Sequence[Labelled]) -> dict[str, list[Labelled]]:
+def group_by_label(items: Sequence[Labelled]) -> dict[str, list[Labelled]]:
+    """Demonstrations or outcomes by label, in the order of first appearance."""
     groups: dict[str, list[Labelled]] = {}
     for item in items:
         groups.setdefault(item.label, []).append(item)

@@ -1,5 +1,6 @@
 """Files to values and back: demonstrations in several formats, models in one that can be trusted."""
 
+from probdmp.io.atomic import write_atomically
 from probdmp.io.formats import read_demonstrations, write_demonstrations
 from probdmp.io.model_contents import ModelContents
 from probdmp.io.model_file import decode_model, encode_model, read_model, write_model
@@ -12,6 +13,7 @@ __all__ = [
     "read_demonstrations",
     "read_model",
     "read_npz",
+    "write_atomically",
     "write_demonstrations",
     "write_model",
     "write_npz",

@@ -1,6 +1,7 @@
 """Replacing a file so that whoever looks, whenever the power fails, finds the old file or the new one, whole.
 
-The data reaches the disk before the name does, and the directory that holds the name afterwards. POSIX.
+The data reaches the disk before the name does, and the directory that holds the name afterwards. A process that is killed
+meanwhile may leave its temporary file, `.<random>.tmp`. POSIX.
 """
 
 import os

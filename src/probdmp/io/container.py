@@ -71,7 +71,7 @@ def unpack(payload: bytes, name: str) -> Container:
     Raises
     ------
     ModelFileError
-        If a single byte is not what `pack` would have written.
+        If the header differs in any byte from the one `pack` would write for what it says, or bytes are missing or left over.
     """
     size = int.from_bytes(payload[:8], "little")
     if len(payload) < 8 or size > min(LARGEST_HEADER, len(payload) - 8):

@@ -112,8 +112,6 @@ def decode_model(payload: bytes, name: str) -> ModelContents:
         )
     except (InputError, InputTypeError) as error:
         raise damaged(name, error.expected, error.got) from error
-    except OverflowError as error:
-        raise damaged(name, "numbers that fit into a float64", str(error)) from error
 
 
 def _check_schema(metadata: Any, name: str) -> None:

@@ -35,7 +35,7 @@ class LearningOptions:
 
     def __post_init__(self) -> None:
         check_choice(self.weight_model, "weight_model", WEIGHT_MODELS)
-        check_fraction(self.smoothing, "smoothing", most=0.5)
+        object.__setattr__(self, "smoothing", check_fraction(self.smoothing, "smoothing", most=0.5))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

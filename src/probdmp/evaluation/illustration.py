@@ -1,0 +1,88 @@
+"""One execution of the experiment in full: as recorded and with a fault, the paper's figure as data."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from probdmp.checks import FloatArray
+from probdmp.demonstrations import Demonstration
+from probdmp.detection import FailureDetector, Verdict
+from probdmp.detection.monitoring import LikelihoodStatistic, replay
+from probdmp.dmp import Primitive, Task
+from probdmp.evaluation.experiment import Experiment, commanded_tasks, draw_trial, group_by_label
+from probdmp.evaluation.outcomes import READINGS
+from probdmp.execution import GaussianTrajectory, roll_out
+from probdmp.learning import LearningOptions, fit_primitive
+
+__all__ = ["Illustration", "JudgedExecution", "illustrate"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JudgedExecution:
+    """A recording and what the detector made of it."""
+
+    recording: Demonstration
+    statistic: FloatArray
+    """(T,) array, nats: log-likelihood with positions in units of their range."""
+    verdict: Verdict
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Illustration:
+    """A primitive, a task, and two executions of it."""
+
+    label: str
+    primitive: Primitive
+    training: Sequence[Demonstration]
+    rollout: GaussianTrajectory
+    """For the task of the execution."""
+    undisturbed: JudgedExecution
+    disturbed: JudgedExecution
+    fault: str
+    onset: float
+    """Seconds at which the fault begins."""
+    level: float
+    """The statistic below which an execution has failed, nats."""
+
+
+def illustrate(demonstrations: Sequence[Demonstration], experiment: Experiment, label: str | None = None) -> Illustration:
+    """Show one execution of an experiment, in the first reading and with the first fault.
+
+    Parameters
+    ----------
+    label : class to show; the first unless given. Of its test executions the first is shown that is rightly judged both as
+        recorded and with the fault, or the first of all if none is.
+    """
+    classes = group_by_label(demonstrations)
+    label = next(iter(classes)) if label is None else label
+    trial, reading, fault = draw_trial(label, classes[label], experiment), READINGS[0], experiment.faults[0]
+    configuration = replace(experiment.configuration, forcing_noise=reading.forcing_noise)
+    primitive, _ = fit_primitive(trial.training, configuration, LearningOptions())
+    detector = FailureDetector(rule=experiment.detector, likelihood=reading.likelihood)
+    detector.fit(primitive, trial.training, tasks=commanded_tasks(primitive, trial.training, experiment.task))
+    tasks = commanded_tasks(primitive, trial.tests, experiment.task)
+    pairs = [
+        (_judge(detector, primitive, task, test), _judge(detector, primitive, task, faulty))
+        for task, test, faulty in zip(tasks, trial.tests, trial.faulty[fault], strict=True)
+    ]
+    right = [not undisturbed.verdict.failed and disturbed.verdict.failed for undisturbed, disturbed in pairs]
+    k = int(np.argmax(right))
+    return Illustration(
+        label=label,
+        primitive=primitive,
+        training=trial.training,
+        rollout=roll_out(primitive, tasks[k], trial.tests[k].dt),
+        undisturbed=pairs[k][0],
+        disturbed=pairs[k][1],
+        fault=fault,
+        onset=trial.onsets[fault][k] * trial.tests[k].dt,
+        level=detector.thresholds_[primitive.identity].level,
+    )
+
+
+def _judge(detector: FailureDetector, primitive: Primitive, task: Task, recording: Demonstration) -> JudgedExecution:
+    statistic = LikelihoodStatistic(detector.likelihood, primitive.ranges)
+    ticks = next(replay(primitive, [task], [recording]))
+    values = np.array([statistic.update(observed)[0] for observed in ticks])
+    return JudgedExecution(recording, values, detector.verdicts([recording], tasks=[task])[0])

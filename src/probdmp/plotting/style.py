@@ -1,0 +1,56 @@
+"""One style for all pictures: few colours that differ in lightness too, so that they survive black-and-white print."""
+
+from contextlib import AbstractContextManager
+from typing import TYPE_CHECKING, Any
+
+from probdmp.errors import MissingExtraError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["ALARM", "BAND", "FAULTY", "MEAN", "RECORDED", "band", "figure_style", "require_matplotlib"]
+
+MEAN = "#1f3a5f"
+BAND = "#9db8d9"
+RECORDED = "#2f7d4f"
+FAULTY = "#c1440e"
+ALARM = "#7a1fa2"
+
+SETTINGS: Any = {
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.labelsize": 9,
+    "axes.titlesize": 10,
+    "axes.titlelocation": "left",
+    "font.family": "DejaVu Sans",
+    "legend.fontsize": 8,
+    "legend.frameon": False,
+    "lines.linewidth": 1.5,
+    "svg.fonttype": "path",
+    "svg.hashsalt": "probdmp",
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+}
+
+
+def require_matplotlib() -> None:
+    """Refuse, with the command to type, where matplotlib is not installed."""
+    try:
+        import matplotlib  # noqa: F401
+    except ImportError as error:
+        raise MissingExtraError("matplotlib for plots", "none installed", "Type: pip install 'probdmp[plot]'") from error
+
+
+def figure_style() -> AbstractContextManager[None]:
+    """The style, as a context."""
+    require_matplotlib()
+    import matplotlib
+
+    return matplotlib.rc_context(SETTINGS)
+
+
+def band(ax: "Axes", times: Any, means: Any, stds: Any, label: str | None = None) -> "Axes":
+    """A mean with its 95 % band, 1.96 standard deviations to either side."""
+    ax.fill_between(times, means - 1.96 * stds, means + 1.96 * stds, color=BAND, alpha=0.6, linewidth=0, label=label)
+    ax.plot(times, means, color=MEAN)
+    return ax

@@ -1,0 +1,124 @@
+"""Random systems and primitives for tests of laws."""
+
+from dataclasses import fields
+
+import numpy as np
+from hypothesis import strategies as st
+
+from probdmp.dmp import Configuration, Primitive, linear_gaussian_model, step_count, task_for
+from probdmp.gaussian import LinearGaussianModel, sample_sequences
+
+BATCH_SHAPES = ((), (2,), (2, 3))
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+def random_covariance(rng, shape, size, rank):
+    """(*shape, size, size) covariance matrices of at most the given rank, with variances about one."""
+    factors = rng.standard_normal((*shape, size, rank)) / np.sqrt(max(rank, 1))
+    products = factors @ factors.mT
+    return (products + products.mT) / 2
+
+
+def random_system(rng, n_states, n_inputs, n_sensors, n_steps, batch=(), noise_rank=None, known_start=False):
+    """A stable system with variances about one; some of its arrays carry the batch axes, the others are shared.
+
+    noise_rank : of the covariance of the inputs; None: full.
+    known_start : whether the first state is known exactly, V0 = 0.
+    """
+
+    def axes():
+        return batch if rng.integers(2) else ()
+
+    shape = axes()
+    a = rng.standard_normal((*shape, n_states, n_states))
+    radius = np.abs(np.linalg.eigvals(a)).max(axis=-1)
+    a *= (rng.uniform(0.3, 0.98, shape) / radius)[..., None, None]
+    shape = axes()
+    r = random_covariance(rng, shape, n_sensors, n_sensors) + 0.1 * np.eye(n_sensors)
+    return LinearGaussianModel(
+        transition=a,
+        input_matrix=rng.standard_normal((*axes(), n_states, n_inputs)),
+        inputs=rng.standard_normal((n_steps - 1, *batch, n_inputs)),
+        input_covariances=random_covariance(
+            rng, (n_steps - 1, *batch), n_inputs, n_inputs if noise_rank is None else noise_rank
+        ),
+        observation_matrix=rng.standard_normal((*axes(), n_sensors, n_states)),
+        observation_covariance=r,
+        initial_mean=rng.standard_normal((*axes(), n_states)),
+        initial_covariance=random_covariance(rng, axes(), n_states, 0 if known_start else n_states),
+    )
+
+
+@st.composite
+def systems(draw, batches=BATCH_SHAPES, max_steps=12):
+    """Systems of 1 to 4 states, 1 or 2 inputs and 1 to 3 sensors, with full, deficient or no process noise."""
+    n_inputs = draw(st.integers(1, 2), label="n_inputs")
+    return random_system(
+        np.random.default_rng(draw(seeds)),
+        draw(st.integers(1, 4), label="n_states"),
+        n_inputs,
+        draw(st.integers(1, 3), label="n_sensors"),
+        draw(st.integers(1, max_steps), label="n_steps"),
+        draw(st.sampled_from(batches), label="batch"),
+        draw(st.integers(0, n_inputs), label="noise_rank"),
+        draw(st.booleans(), label="known_start"),
+    )
+
+
+def draw_observations(model, rng, missing=0.0):
+    """(T, *batch, O) observations as the model itself would make them, of which a fraction is NaN."""
+    observations = sample_sequences(model, 1, rng)[1][0]
+    observations[rng.random(observations.shape) < missing] = np.nan
+    return observations
+
+
+def make_primitive(rng, n_dof=2, n_basis=8, **changes):
+    """A random primitive with movements about one unit large, between 0.5 and 2 s long.
+
+    changes : fields of `Primitive` or of `Configuration` to be as given.
+    """
+    choices = {f.name: changes.pop(f.name) for f in fields(Configuration) if f.name in changes}
+    configuration = Configuration(n_basis=n_basis, **choices)
+    stiffness = configuration.alpha_z**2 / 4  # a forcing term of this size moves the attractor by one unit
+    start, displacement = rng.uniform(-1, 1, n_dof), rng.choice([-1, 1], n_dof) * rng.uniform(0.5, 1, n_dof)
+    values = {
+        "weight_means": rng.standard_normal((n_dof, n_basis)) * stiffness,
+        "weight_covariances": random_covariance(rng, (n_dof,), n_basis, n_basis) * (0.1 * stiffness) ** 2,
+        "weight_precisions": np.full(n_dof, stiffness**-2),
+        "forcing_precisions": rng.uniform(0.5, 2, n_dof) * (0.1 * stiffness) ** -2,
+        "observation_variances": 10 ** rng.uniform(-6, -2, n_dof),
+        "goal_displacements": displacement,
+        "ranges": np.ones(n_dof),
+        "start": start,
+        "goal": start + displacement,
+        "start_velocities": rng.standard_normal(n_dof),
+        "start_covariances": random_covariance(rng, (n_dof,), 2, 2) * 0.01,
+        "duration": float(rng.uniform(0.5, 2)),
+        "dt": 0.01,
+        "phase_step": 0.01,
+        "n_demonstrations": 10,
+        "names": tuple(f"q{i}" for i in range(n_dof)),
+        "units": "m",
+    }
+    return Primitive(configuration=configuration, **(values | changes))
+
+
+@st.composite
+def primitives(draw, **changes):
+    """Primitives of 1 to 3 degrees of freedom with all choices of `Configuration`; `changes` as for `make_primitive`."""
+    choices = {
+        "discretization": draw(st.sampled_from(["exact", "semi_implicit_euler"])),
+        "scaling": draw(st.sampled_from(["none", "paper"])),
+        "forcing_noise": draw(st.sampled_from(["posterior", "predictive"])),
+    }
+    rng = np.random.default_rng(draw(seeds))
+    return make_primitive(rng, draw(st.integers(1, 3)), draw(st.integers(1, 12)), **(choices | changes))
+
+
+def dmp_system(rng, n_dof=2, n_steps=40, **changes):
+    """The linear-Gaussian system of a random primitive that carries out its own task in `n_steps` states."""
+    primitive = make_primitive(rng, n_dof, **changes)
+    dt = primitive.duration / (n_steps - 1)
+    assert step_count(primitive.duration, dt) == n_steps
+    return linear_gaussian_model(primitive, task_for(primitive), dt, n_steps)
