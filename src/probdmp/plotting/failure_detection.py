@@ -47,5 +47,5 @@ def plot_log_likelihoods(ax: "Axes", illustration: Illustration) -> "Axes":
         ax.plot(verdict.time, value, marker="v", color=ALARM, markersize=8, linestyle="none", label="alarm")
     ax.set_xlabel("Time [s]")
     ax.set_ylabel("Log-likelihood per step [nats]")
-    ax.legend(loc="lower left")
+    ax.legend(loc="best")
     return ax

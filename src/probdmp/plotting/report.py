@@ -106,10 +106,10 @@ def draw_bands(illustration: Illustration) -> "Figure":
 
 
 def draw_failure_detection(illustration: Illustration) -> "Figure":
-    """The paper's figure: undisturbed, disturbed, log-likelihoods."""
+    """The paper's figure: undisturbed, disturbed, log-likelihoods; of the degree of freedom that is blamed."""
     import matplotlib.pyplot as plt
 
-    dof = int(illustration.primitive.ranges.argmax())
+    dof = int(illustration.disturbed.verdict.contributions.argmin())
     figure, (left, middle, right) = plt.subplots(1, 3, figsize=(11, 3.2), layout="constrained")
     plot_judged_execution(left, illustration, illustration.undisturbed, dof).set_title("As recorded")
     plot_judged_execution(middle, illustration, illustration.disturbed, dof).set_title(f"With the fault “{illustration.fault}”")

@@ -40,7 +40,7 @@ def plot_paths(ax: "Axes", demonstrations: Sequence[Demonstration], rollout: Gau
         path = demonstration.positions - demonstration.positions[0] + rollout.positions[0]
         ax.plot(path[:, 0], path[:, 1], color="0.65", linewidth=0.8)
     ax.plot(rollout.positions[:, 0], rollout.positions[:, 1], color=MEAN, linewidth=2)
-    ax.set_aspect("equal", adjustable="datalim")
+    ax.set_aspect("equal")
     ax.set_xlabel(f"{rollout.names[0]} [{rollout.units or '–'}]")
     ax.set_ylabel(f"{rollout.names[1]} [{rollout.units or '–'}]")
     return ax

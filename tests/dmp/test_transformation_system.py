@@ -1,0 +1,125 @@
+"""One step of the spring-damper system, against the matrix exponential and the paper's scalar equations."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.linalg import expm
+
+from probdmp.dmp.transformation_system import DISCRETIZATIONS
+from probdmp.errors import InputError
+
+alphas = st.floats(1.0, 60.0)
+durations = st.floats(0.05, 20.0)
+stiffnesses = st.floats(1e-4, 1.6)
+"""alpha_z dt / duration; semi-implicit Euler is stable below 1.66."""
+
+
+def step_of(scheme, alpha_z, duration, dt):
+    system = DISCRETIZATIONS[scheme].step(alpha_z, np.asarray(duration), np.asarray(dt))
+    return system.transition, system.input_vector
+
+
+@settings(deadline=None)
+@given(alphas, durations, st.floats(1e-4, 20.0))
+def test_exact_is_the_matrix_exponential(alpha_z, duration, stiffness):
+    dt = stiffness * duration / alpha_z
+    a, b = step_of("exact", alpha_z, duration, dt)
+    # In units of the step, where all numbers are about one: velocity * dt, input * (dt / duration)^2
+    k = alpha_z * dt / duration
+    zoh = expm(np.array([[-k, -(k**2) / 4, 1.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]))
+    units = np.array([[1.0, dt], [1 / dt, 1.0]])
+    np.testing.assert_allclose(a[1:, 1:] * units, zoh[:2, :2], rtol=1e-10, atol=1e-13)
+    gain = (dt / duration) ** 2
+    np.testing.assert_allclose(np.array([b[1] * dt, b[2]]) / gain, zoh[:2, 2], rtol=1e-8, atol=1e-13)
+
+
+@settings(deadline=None)
+@given(st.sampled_from(sorted(DISCRETIZATIONS)), alphas, durations, stiffnesses)
+def test_acceleration_is_the_mean_over_the_step(scheme, alpha_z, duration, stiffness):
+    dt = stiffness * duration / alpha_z
+    a, b = step_of(scheme, alpha_z, duration, dt)
+    np.testing.assert_allclose(a[0] * dt, a[1] - [0, 1, 0], rtol=1e-9, atol=1e-12 * abs(a[1]).max())
+    np.testing.assert_allclose(b[0] * dt, b[1], rtol=1e-13)
+    assert not a[:, 0].any()  # the acceleration of the step before is forgotten
+
+
+@settings(deadline=None)
+@given(alphas, durations, stiffnesses, st.integers(0, 2**32 - 1))
+def test_semi_implicit_euler_is_the_scalar_recursion_step_by_step(alpha_z, duration, stiffness, seed):
+    dt, rng = stiffness * duration / alpha_z, np.random.default_rng(seed)
+    a, b = step_of("semi_implicit_euler", alpha_z, duration, dt)
+    start, goal, scaled_velocity, *forcing = rng.standard_normal(33)
+    state = np.array([0.0, scaled_velocity / duration, start])
+    p, z, tau, beta_z = start, scaled_velocity, 1 / duration, alpha_z / 4
+    for f in forcing:
+        state = a @ state + b * (alpha_z * beta_z * goal + alpha_z * beta_z * f)
+        z_dot = tau * (alpha_z * (beta_z * (goal - p) - z) + alpha_z * beta_z * f)
+        z = z + z_dot * dt
+        p = p + tau * z * dt
+        np.testing.assert_allclose(state * [duration**2 / alpha_z**2, duration / alpha_z, 1], [
+            tau * z_dot * duration**2 / alpha_z**2, tau * z * duration / alpha_z, p
+        ], atol=1e-11)  # fmt: skip
+
+
+@settings(deadline=None)
+@given(st.sampled_from(sorted(DISCRETIZATIONS)), alphas, durations, stiffnesses)
+def test_the_goal_is_the_fixed_point_for_any_duration(scheme, alpha_z, duration, stiffness):
+    """B carries tau^2; as printed in the paper the fixed point would be goal / tau^2."""
+    a, b = step_of(scheme, alpha_z, duration, stiffness * duration / alpha_z)
+    goal = np.array([0.0, 0.0, 1.0])
+    moved = a @ goal + b * alpha_z**2 / 4
+    scale = np.array([duration**2 / alpha_z**2, duration / alpha_z, 1.0])
+    np.testing.assert_allclose(moved * scale, goal * scale, atol=1e-12)
+    assert np.abs(np.linalg.eigvals(a)).max() < 1
+
+
+@pytest.mark.parametrize("scheme", DISCRETIZATIONS)
+def test_from_rest_it_comes_to_the_goal(scheme):
+    a, b = step_of(scheme, 25.0, 3.0, 0.01)
+    state = np.zeros(3)
+    for _ in range(900):
+        state = a @ state + b * 25**2 / 4 * 7.0
+    np.testing.assert_allclose(state, [0, 0, 7.0], atol=1e-6)
+
+
+def test_exact_composes_two_half_steps_are_one():
+    half, b_half = step_of("exact", 25.0, 1.3, 0.005)
+    whole, b_whole = step_of("exact", 25.0, 1.3, 0.01)
+    np.testing.assert_allclose((half @ half)[1:], whole[1:], rtol=1e-12)
+    np.testing.assert_allclose((half @ b_half + b_half)[1:], b_whole[1:], rtol=1e-12)
+
+
+def test_semi_implicit_euler_refuses_steps_at_which_it_is_unstable():
+    limit = np.sqrt(32) - 4
+    a, _ = step_of("semi_implicit_euler", 25.0, 1.0, limit * 0.9999 / 25)
+    assert np.abs(np.linalg.eigvals(a)).max() <= 1
+    with pytest.raises(InputError, match=r"Expected alpha_z dt / duration <= 1\.657.*got 1\.66\..*smaller dt, or.*exact"):
+        step_of("semi_implicit_euler", 25.0, 1.0, limit * 1.001 / 25)
+    k = limit * 1.001  # the scalar equations themselves, at that step: |eigenvalue| > 1
+    unstable = np.array([[1 - k, -(k**2) / 4], [1 - k, 1 - k**2 / 4]])
+    assert np.abs(np.linalg.eigvals(unstable)).max() > 1
+
+
+def test_one_unstable_member_of_a_batch_is_enough():
+    with pytest.raises(InputError, match=r"got 2\.5\."):
+        step_of("semi_implicit_euler", 25.0, np.array([1.0, 0.1]), np.array([0.01, 0.01]))
+
+
+def test_exact_is_stable_at_any_step():
+    for dt in (0.1, 1.0, 10.0, 1e3):
+        a, b = step_of("exact", 25.0, 1.0, dt)
+        assert np.abs(np.linalg.eigvals(a)).max() < 1
+        np.testing.assert_allclose((a @ [0, 0, 1] + b * 25**2 / 4)[2], 1, rtol=1e-12)
+
+
+@pytest.mark.parametrize("scheme", DISCRETIZATIONS)
+def test_a_batch_is_its_members(scheme):
+    rng = np.random.default_rng(0)
+    duration, dt = rng.uniform(0.5, 2, (2, 3)), rng.uniform(0.001, 0.02, (2, 3))
+    a, b = step_of(scheme, 25.0, duration, dt)
+    assert a.shape == (2, 3, 3, 3)
+    for i in np.ndindex(2, 3):
+        one, into = step_of(scheme, 25.0, duration[i], dt[i])
+        np.testing.assert_allclose(a[i], one, rtol=1e-15)
+        np.testing.assert_allclose(b[i], into, rtol=1e-15)

@@ -1,0 +1,72 @@
+"""The house: import direction, sizes, documentation."""
+
+import ast
+from pathlib import Path
+from statistics import median
+
+import pytest
+
+import probdmp
+
+ROOT = Path(probdmp.__file__).parent
+LAYERS = (
+    *("errors", "checks", "gaussian", "demonstrations", "dmp", "io", "learning", "execution", "detection"),
+    *("evaluation", "estimator", "plotting", "cli"),
+)
+"""From the bottom up: a module imports only from names before its own."""
+
+MODULES = sorted(ROOT.rglob("*.py"))
+
+
+def layer_of(path: Path) -> str:
+    return path.relative_to(ROOT).with_suffix("").parts[0]
+
+
+def probdmp_imports(path: Path) -> set[str]:
+    """Layers that a module imports from, anywhere in it."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        names = []
+        if isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative imports hide where a name comes from"
+            names = [f"{node.module}.{alias.name}" if node.module == "probdmp" else str(node.module) for alias in node.names]
+        elif isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        found |= {name.split(".")[1] for name in names if name.startswith("probdmp.")}
+    return found
+
+
+def test_every_module_is_in_a_known_layer() -> None:
+    assert {layer_of(path) for path in MODULES} - {"__init__", "__main__"} == set(LAYERS)
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_imports_point_downward(path: Path) -> None:
+    if layer_of(path) in ("__init__", "__main__"):
+        return
+    rank = LAYERS.index(layer_of(path))
+    upward = {name for name in probdmp_imports(path) - {layer_of(path), "__version__"} if LAYERS.index(name) >= rank}
+    assert not upward
+
+
+def test_only_the_command_line_imports_the_estimator() -> None:
+    assert {layer_of(p) for p in MODULES if "estimator" in probdmp_imports(p)} <= {"__init__", "cli"}
+
+
+def test_modules_are_small() -> None:
+    lines = {path: len(path.read_text().splitlines()) for path in MODULES}
+    assert median(lines.values()) <= 100
+    assert max(lines.values()) <= 350, max(lines, key=lines.__getitem__)
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_everything_public_is_documented(path: Path) -> None:
+    tree = ast.parse(path.read_text())
+    assert ast.get_docstring(tree), "module"
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
+            assert ast.get_docstring(node), node.name
+
+
+def test_no_module_is_named_for_nothing() -> None:
+    assert not {path.stem for path in MODULES} & {"utils", "util", "helpers", "misc", "core", "common", "tools"}

@@ -1,0 +1,60 @@
+"""The front door."""
+
+import subprocess
+import sys
+
+import probdmp
+
+PUBLIC = [
+    "Demonstration",
+    "FailureDetector",
+    "GaussianTrajectory",
+    "InputError",
+    "ModelFileError",
+    "OnlineExecution",
+    "Primitive",
+    "PrimitiveLibrary",
+    "ProbDMPError",
+    "ProbabilisticDMP",
+    "Task",
+    "TrackedTrajectory",
+    "Verdict",
+    "demonstration_from_times",
+    "load",
+    "load_detector",
+    "read_demonstrations",
+    "synthetic_letters",
+    "write_demonstrations",
+]
+
+
+def test_the_front_door_is_this_list() -> None:
+    assert probdmp.__all__ == PUBLIC == sorted(PUBLIC)
+    assert len(PUBLIC) <= 20
+
+
+def test_every_public_name_is_there_and_documented() -> None:
+    for name in PUBLIC:
+        assert getattr(probdmp, name).__doc__
+        assert name in dir(probdmp)
+
+
+def test_other_names_are_not() -> None:
+    assert not hasattr(probdmp, "ProDMP")
+
+
+def loaded_after(statement: str) -> set[str]:
+    """Top-level packages in a fresh interpreter after a statement."""
+    script = f"{statement}; import sys; print(*{{name.split('.')[0] for name in sys.modules}})"
+    return set(subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split())
+
+
+def test_the_core_needs_numpy_alone_until_it_is_used() -> None:
+    loaded = loaded_after("import probdmp; [getattr(probdmp, name) for name in probdmp.__all__]")
+    assert "numpy" in loaded
+    assert not loaded & {"scipy", "matplotlib", "safetensors", "typer", "rich", "click", "sklearn"}
+
+
+def test_importing_alone_loads_nothing() -> None:
+    assert "numpy" not in loaded_after("import probdmp")
+    assert "probdmp.dmp" not in loaded_after("import probdmp.gaussian")
