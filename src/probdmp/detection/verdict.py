@@ -28,6 +28,6 @@ class Verdict:
 
     def __str__(self) -> str:
         if not self.failed:
-            return f"fine: largest test ratio {self.test_ratio:.2f}, at {self.time:.3f} s"
+            return f"fine: largest test ratio {self.test_ratio:.2f}"
         blamed = self.names[int(self.contributions.argmin())]
         return f"failed at {self.time:.3f} s (phase {self.phase:.2f}): test ratio {self.test_ratio:.2f}, mostly {blamed}"
