@@ -75,57 +75,89 @@ def system_at(model, index=()):
 # --- 1. brute force ---------------------------------------------------------------------------------------------------
 
 
+class Joint(NamedTuple):
+    """The Gaussian over all states and all observations, T times, n states, O sensors."""
+
+    state_means: np.ndarray
+    """(T, n)"""
+    state_covariance: np.ndarray
+    """(T, n, T, n)"""
+    observation_means: np.ndarray
+    """(T, O)"""
+    observation_covariance: np.ndarray
+    """(T, O, T, O), sensor noise included."""
+    cross_covariance: np.ndarray
+    """(T, O, T, n), of observations with states."""
+
+
+def dense_joint(system, digits=None):
+    """Every state is a mean plus a matrix times independent sources (s[0] - m0, e[0], .., e[T-2]); every entry written out.
+
+    digits : of decimal arithmetic (arrays of `Decimal`); None: double precision.
+    """
+    with localcontext() as context:
+        context.prec = digits or context.prec
+        A, B, u, U, C, R, m0, V0 = (_numbers(array, digits) for array in system)
+        T, n, m = len(u) + 1, *B.shape
+        n_sources = n + (T - 1) * m
+        means, G, sources = np.zeros((T, n), A.dtype), np.zeros((T, n, n_sources), A.dtype), np.zeros((n_sources,) * 2, A.dtype)
+        means[0], G[0][:, :n], sources[:n, :n] = m0, np.eye(n, dtype=A.dtype), V0
+        for t in range(1, T):
+            e = slice(n + (t - 1) * m, n + t * m)  # e[t-1], which drives s[t-1] to s[t]
+            means[t] = A @ means[t - 1] + B @ u[t - 1]
+            G[t] = A @ G[t - 1]
+            G[t][:, e] += B
+            sources[e, e] = U[t - 1]
+        rows = G.reshape(T * n, n_sources)
+        states = (rows @ sources @ rows.T).reshape(T, n, T, n)
+        cross = np.tensordot(C, states, (1, 1)).swapaxes(0, 1)
+        observations = np.tensordot(cross, C, (3, 1))
+        for t in range(T):
+            observations[t, :, t, :] += R
+        return Joint(means, states, means @ C.T, observations, cross)
+
+
 def dense_posterior(system, observations, digits=None):
-    """Condition the joint Gaussian of all states on the observations (T, O), of which NaN entries were not seen.
+    """Condition the joint Gaussian on the observations (T, O), of which NaN entries were not seen.
 
     digits : of decimal arithmetic; None: double precision, for long series that are well conditioned.
     """
     with localcontext() as context:
         context.prec = digits or context.prec
-        exact = np.vectorize(Decimal, otypes=[object]) if digits else np.asarray
         ln, pi = (Decimal.ln, Decimal(PI)) if digits else (math.log, math.pi)
-        A, B, u, U, C, R, m0, V0 = (exact(array) for array in system)
-        T, n, m = len(u) + 1, *B.shape
-        # Every state is a mean plus a matrix G times independent sources (s[0] - m0, e[0], .., e[T-2]).
-        n_sources = n + (T - 1) * m
-        means, G, sources = np.zeros((T, n), A.dtype), np.zeros((T, n, n_sources), A.dtype), np.zeros((n_sources,) * 2, A.dtype)
-        means[0], G[0][:, :n], sources[:n, :n] = m0, exact(np.eye(n)), V0
-        for t in range(1, T):
-            e = slice(n + (t - 1) * m, n + t * m)
-            means[t] = A @ means[t - 1] + B @ u[t - 1]
-            G[t] = A @ G[t - 1]
-            G[t][:, e] += B
-            sources[e, e] = U[t - 1]
-        # What was seen, in order of time: o = mean + (C G) sources + v.
-        seen = ~np.isnan(observations)
-        times, sensors = np.nonzero(seen)
-        H = (C @ G)[times, sensors]
-        spread = H @ sources
-        S = spread @ H.T + np.where(times[:, None] == times, R[sensors[:, None], sensors], 0 * R[0, 0])
-        cross = spread @ G.reshape(T * n, n_sources).T
-        residual = exact(observations[times, sensors]) - (means @ C.T)[times, sensors]
+        joint = dense_joint(system, digits)
+        T, n = joint.state_means.shape
+        times, sensors = np.nonzero(~np.isnan(observations))  # what was seen, in the order of time
+        S = joint.observation_covariance[times, sensors][:, times, sensors]
+        residual = _numbers(observations[times, sensors], digits) - joint.observation_means[times, sensors]
         # With S = L L^T, the leading part of L is the factor for the leading observations: one factorisation serves all times.
         L = _cholesky(S)
-        white = _solve_lower(L, np.concatenate([residual[:, None], cross], axis=1))
-        z, W = white[:, 0], white[:, 1:].reshape(len(times), T, n)
+        z = _solve_lower(L, residual)
+        W = _solve_lower(L, joint.cross_covariance[times, sensors].reshape(-1, T * n)).reshape(-1, T, n)
         log_densities = [-(a * a + 2 * ln(b) + ln(2 * pi)) / 2 for a, b in zip(z, np.diagonal(L), strict=True)]
 
         def given(known):  # known(t): which observations count for the state at t
-            posterior_means, covariances = [], []
+            means, covariances = [], []
             for t in range(T):
-                w, count = W[:, t], np.flatnonzero(known(t))
-                posterior_means.append(means[t] + w[count].T @ z[count])
-                covariances.append(G[t] @ sources @ G[t].T - w[count].T @ w[count])
-            return np.array(posterior_means, dtype=np.float64), np.array(covariances, dtype=np.float64)
+                k = known(t)
+                means.append(joint.state_means[t] + W[k, t].T @ z[k])
+                covariances.append(joint.state_covariance[t, :, t, :] - W[k, t].T @ W[k, t])
+            return np.array(means, dtype=np.float64), np.array(covariances, dtype=np.float64)
 
         return Posterior(
             prior=given(lambda t: times < 0),
             predicted=given(lambda t: times < t),
             filtered=given(lambda t: times <= t),
             smoothed=given(lambda t: times >= 0),
-            log_likelihoods=np.array([float(sum(x for x, k in zip(log_densities, times, strict=True) if k == t)) for t in range(T)]),
+            log_likelihoods=np.array(
+                [float(sum(d for d, k in zip(log_densities, times, strict=True) if k == t)) for t in range(T)]
+            ),
             log_likelihood=float(sum(log_densities)),
         )
+
+
+def _numbers(array, digits):
+    return np.vectorize(Decimal, otypes=[object])(array) if digits else np.asarray(array)
 
 
 def _cholesky(S):
@@ -141,6 +173,24 @@ def _solve_lower(L, right):
     for i in range(len(L)):
         X[i] = (right[i] - L[i, :i] @ X[:i]) / L[i, i]
     return X
+
+
+def deviation_in_stds(means, covariances, expected, stds, least=1e-5):
+    """Largest error of means (T, n) and of covariances (T, n, n), in units of `stds` (T, n) and of their products.
+
+    least : of the mean's size, in place of a std that is smaller. A known state has no spread; 1e-9 of 1e-5 is some rounding.
+    """
+    expected_means, expected_covariances = expected
+    unit = np.maximum(stds, least * (1 + np.abs(expected_means)))
+    return max(
+        np.max(np.abs(means - expected_means) / unit),
+        np.max(np.abs(covariances - expected_covariances) / (unit[:, :, None] * unit[:, None, :])),
+    )
+
+
+def marginal_stds(covariances):
+    """(*shape, n) from (*shape, n, n)."""
+    return np.sqrt(np.maximum(np.diagonal(covariances, axis1=-2, axis2=-1), 0))
 
 
 # --- 2. textbook recursions -------------------------------------------------------------------------------------------

@@ -4,6 +4,7 @@ from dataclasses import fields
 
 import numpy as np
 from hypothesis import strategies as st
+from reference import system_at
 
 from probdmp.dmp import Configuration, Primitive, linear_gaussian_model, step_count, task_for
 from probdmp.gaussian import LinearGaussianModel, sample_sequences
@@ -71,6 +72,27 @@ def draw_observations(model, rng, missing=0.0):
     observations = sample_sequences(model, 1, rng)[1][0]
     observations[rng.random(observations.shape) < missing] = np.nan
     return observations
+
+
+def batch_indices(model):
+    """The index of every entry of the batch; a model without batch axes has the one entry ()."""
+    return list(np.ndindex(model.batch_shape))
+
+
+def single(model, index):
+    """The model of one entry of the batch."""
+    return LinearGaussianModel(*system_at(model, index))
+
+
+def stacked(models):
+    """Models of equal size as one batch (K,)."""
+    timed = ("inputs", "input_covariances")
+    return LinearGaussianModel(
+        **{
+            f.name: np.stack([getattr(m, f.name) for m in models], axis=1 if f.name in timed else 0)
+            for f in fields(LinearGaussianModel)
+        }
+    )
 
 
 def make_primitive(rng, n_dof=2, n_basis=8, **changes):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from probdmp.dmp.phase import phases_at
@@ -10,13 +10,11 @@ from probdmp.dmp.phase import phases_at
 durations = st.floats(1e-3, 1e3)
 
 
-@settings(deadline=None)
 @given(durations)
 def test_it_falls_from_one_to_a_hundredth(duration):
     np.testing.assert_allclose(phases_at(np.array([0.0, duration]), duration), [1.0, 0.01], rtol=1e-14)
 
 
-@settings(deadline=None)
 @given(durations, st.floats(0, 2), st.floats(0, 2))
 def test_equal_times_take_equal_fractions(duration, first, second):
     both = phases_at(np.array((first + second) * duration), duration)

@@ -130,7 +130,7 @@ def test_configuration_refuses(changes, match):
 
 
 def test_the_published_configuration():
-    assert PUBLISHED == Configuration(discretization="semi_implicit_euler", scaling="paper", alpha_z=25.0)
+    assert Configuration(discretization="semi_implicit_euler", scaling="paper", alpha_z=25.0) == PUBLISHED
 
 
 # --- identity ---------------------------------------------------------------------------------------------------------

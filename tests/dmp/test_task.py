@@ -51,8 +51,15 @@ def test_bad_points_are_refused_by_name(primitive, name, bad, error, match):
 
 @pytest.mark.parametrize(
     ("bad", "error"),
-    [(0, InputError), (-1.0, InputError), (np.nan, InputError), (np.inf, InputError), ("1", InputTypeError), ([1.0], InputTypeError)],
-)  # fmt: skip
+    [
+        (0, InputError),
+        (-1.0, InputError),
+        (np.nan, InputError),
+        (np.inf, InputError),
+        ("1", InputTypeError),
+        ([1], InputTypeError),
+    ],
+)
 def test_bad_durations_are_refused(primitive, bad, error):
     with pytest.raises(error, match="Expected duration > 0 in seconds"):
         task_for(primitive, duration=bad)

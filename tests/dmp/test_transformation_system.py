@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
@@ -20,7 +20,6 @@ def step_of(scheme, alpha_z, duration, dt):
     return system.transition, system.input_vector
 
 
-@settings(deadline=None)
 @given(alphas, durations, st.floats(1e-4, 20.0))
 def test_exact_is_the_matrix_exponential(alpha_z, duration, stiffness):
     dt = stiffness * duration / alpha_z
@@ -34,7 +33,6 @@ def test_exact_is_the_matrix_exponential(alpha_z, duration, stiffness):
     np.testing.assert_allclose(np.array([b[1] * dt, b[2]]) / gain, zoh[:2, 2], rtol=1e-8, atol=1e-13)
 
 
-@settings(deadline=None)
 @given(st.sampled_from(sorted(DISCRETIZATIONS)), alphas, durations, stiffnesses)
 def test_acceleration_is_the_mean_over_the_step(scheme, alpha_z, duration, stiffness):
     dt = stiffness * duration / alpha_z
@@ -44,7 +42,6 @@ def test_acceleration_is_the_mean_over_the_step(scheme, alpha_z, duration, stiff
     assert not a[:, 0].any()  # the acceleration of the step before is forgotten
 
 
-@settings(deadline=None)
 @given(alphas, durations, stiffnesses, st.integers(0, 2**32 - 1))
 def test_semi_implicit_euler_is_the_scalar_recursion_step_by_step(alpha_z, duration, stiffness, seed):
     dt, rng = stiffness * duration / alpha_z, np.random.default_rng(seed)
@@ -62,7 +59,6 @@ def test_semi_implicit_euler_is_the_scalar_recursion_step_by_step(alpha_z, durat
         ], atol=1e-11)  # fmt: skip
 
 
-@settings(deadline=None)
 @given(st.sampled_from(sorted(DISCRETIZATIONS)), alphas, durations, stiffnesses)
 def test_the_goal_is_the_fixed_point_for_any_duration(scheme, alpha_z, duration, stiffness):
     """B carries tau^2; as printed in the paper the fixed point would be goal / tau^2."""

@@ -1,6 +1,7 @@
 """Recorded movement as checked data, the built-in letters, and faults to inject."""
 
 from probdmp.demonstrations.demonstration import Demonstration, as_demonstrations, stack_positions
+from probdmp.demonstrations.extent import mean_ranges
 from probdmp.demonstrations.faults import FAULTS, hold
 from probdmp.demonstrations.letters import LETTERS, WriterVariation, synthetic_letters
 from probdmp.demonstrations.resampling import demonstration_from_times
@@ -15,6 +16,7 @@ __all__ = [
     "as_demonstrations",
     "demonstration_from_times",
     "hold",
+    "mean_ranges",
     "noise_stds",
     "smooth_path",
     "stack_positions",

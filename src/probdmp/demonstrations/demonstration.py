@@ -14,8 +14,8 @@ __all__ = ["LONGEST_RECORDING", "SHORTEST_RECORDING", "Demonstration", "as_demon
 
 SHORTEST_RECORDING = 3
 """Samples; acceleration needs three."""
-LONGEST_RECORDING = 1_000_000
-"""Samples, a quarter of an hour at 1 kHz; more is refused rather than left to fill the memory."""
+LONGEST_RECORDING = 100_000
+"""Samples, 100 s at 1 kHz; more is refused rather than computed for minutes."""
 
 MILLISECONDS_HINT = "A time in milliseconds? Divide it by 1000."
 

@@ -1,7 +1,8 @@
 """From demonstrations to a primitive: forcing targets, Bayesian regression, observation noise by EM."""
 
-from probdmp.learning.fit import FitReport, LearningOptions, fit_primitive
+from probdmp.learning.fit import fit_primitive
 from probdmp.learning.observation_noise import ObservationNoise, estimate_observation_noise
+from probdmp.learning.options import FitReport, LearningOptions
 
 __all__ = [
     "FitReport",

@@ -18,8 +18,8 @@ from probdmp.checks import FloatArray
 
 __all__ = ["WeightPosterior", "log_evidence", "regress_weights"]
 
-LARGEST_SIGNAL_TO_NOISE = 1e12
-"""Bound on beta times the mean square of the targets: targets that the basis fits perfectly have no finite beta."""
+LARGEST_RATIO = 1e12
+"""Of the mean square of the targets to 1 / beta, and of alpha to what targets of that size suggest."""
 MOST_ITERATIONS = 1000
 TOLERANCE = 1e-8
 
@@ -37,34 +37,32 @@ class WeightPosterior(NamedTuple):
     """Precision of the targets around their mean."""
 
 
-def regress_weights(features: FloatArray, targets: FloatArray) -> WeightPosterior:
+def regress_weights(features: FloatArray, targets: FloatArray, resolution: float) -> WeightPosterior:
     """Posterior over weights, with alpha and beta by evidence maximisation.
 
     Parameters
     ----------
     features : Phi, (n, N) array.
     targets : f, (n,) array.
+    resolution : size of targets that is as good as nothing, > 0; a movement that stands still has no others.
     """
-    size = float(np.mean(targets**2))
-    if size == 0:  # nothing moves: no weight is needed, and any scale of the prior says so
-        size = np.finfo(np.float64).tiny ** 0.5
+    size = float(np.mean(targets**2)) + resolution**2
     eigenvalues, vectors = np.linalg.eigh(features.T @ features)
     eigenvalues = np.maximum(eigenvalues, 0.0)
     projected = vectors.T @ (features.T @ targets)
     energy = float(targets @ targets)
-    largest_beta = LARGEST_SIGNAL_TO_NOISE / size
-    # Bounds of alpha: weights so large or so small that the features cannot turn them into such targets.
-    scale = max(float(eigenvalues.max()) / len(targets), np.finfo(np.float64).tiny)
-    least_alpha, largest_alpha = scale / size * 1e-12, scale / size * 1e12
-    alpha, beta = scale / size, 10 / size
+    # Bounds, for targets that are nothing but noise, or not noisy at all.
+    scale = float(eigenvalues.max()) / len(targets) / size
+    largest_beta = LARGEST_RATIO / size
+    alpha, beta = scale, 10 / size
     for _ in range(MOST_ITERATIONS):
         shrunk = beta / (alpha + beta * eigenvalues)
         weights = shrunk * projected
         gamma = float(np.sum(shrunk * eigenvalues))
-        residual = max(energy - 2 * float(weights @ projected) + float(eigenvalues @ weights**2), 0.0)
+        residual = energy - 2 * float(weights @ projected) + float(eigenvalues @ weights**2)
         before = np.array([alpha, beta])
-        alpha = float(np.clip(gamma / max(float(weights @ weights), np.finfo(np.float64).tiny), least_alpha, largest_alpha))
-        beta = min((len(targets) - gamma) / max(residual, np.finfo(np.float64).tiny), largest_beta)
+        alpha = gamma / max(float(weights @ weights), gamma / (scale * LARGEST_RATIO))
+        beta = (len(targets) - gamma) / max(residual, (len(targets) - gamma) / largest_beta)
         if np.all(np.abs(np.log(before / [alpha, beta])) < TOLERANCE):
             break
     covariance = (vectors / (alpha + beta * eigenvalues)) @ vectors.T

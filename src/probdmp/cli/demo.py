@@ -1,0 +1,71 @@
+"""`probdmp demo`: the main job on built-in data."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from probdmp.cli.evaluate import Test, Train, evaluation_of
+from probdmp.cli.evaluation_table import print_evaluation
+from probdmp.cli.exit_codes import message, usage
+from probdmp.cli.options import Json, Seed, check_output
+from probdmp.cli.output import print_json, print_line
+from probdmp.errors import MissingExtraError
+
+if TYPE_CHECKING:
+    from probdmp.demonstrations import Demonstration
+    from probdmp.evaluation import Evaluation
+
+__all__ = ["demo"]
+
+
+def demo(
+    letters: Annotated[
+        str | None, typer.Option(metavar="LETTERS", help="Such as abc. Default: all 22 one-stroke letters.")
+    ] = None,
+    train: Train = 10,
+    test: Test = 10,
+    seed: Seed = 0,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", metavar="FILE.html", help="Report with the table and figures.")
+    ] = Path("report.html"),
+    as_json: Json = False,
+) -> None:
+    """Learn letters, block them half-way, detect it; writes a report.
+
+    Prints the paper's table of false alarms and detected failures; the report has the paper's figure as well.
+
+    The letters are synthetic: a writer who varies shape, size, slant, tempo and place. Takes less than a minute; fewer
+    --letters take less.
+    """
+    check_output(output, ".html")
+    from probdmp.demonstrations import LETTERS, synthetic_letters
+    from probdmp.evaluation import Experiment
+
+    letters = LETTERS if letters is None else letters
+    with usage():
+        experiment = Experiment(train, test, seed)
+        demonstrations = synthetic_letters(train + test, seed, letters)
+    result = evaluation_of(demonstrations, experiment)
+    if as_json:
+        print_json(result.as_dict())
+    else:
+        print_evaluation(result)
+    command = f"probdmp demo --letters {letters} --train {train} --test {test} --seed {seed}"
+    if _reported(output, result, demonstrations, command) and not as_json:
+        print_line(f"Report: {output}")
+
+
+def _reported(path: Path, result: "Evaluation", demonstrations: list["Demonstration"], command: str) -> bool:
+    """Write the report; False if what draws it is not installed, which is said but is no failure."""
+    from probdmp.evaluation import illustrate
+
+    try:
+        from probdmp.plotting.report import write_report
+
+        write_report(path, result, illustrate(demonstrations, result.experiment), command)
+    except MissingExtraError as error:
+        print(f"probdmp: no report: {message(error)}", file=sys.stderr)
+        return False
+    return True

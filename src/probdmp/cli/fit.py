@@ -1,0 +1,161 @@
+"""`probdmp fit`: learn primitives and their failure detector from demonstrations."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from probdmp.cli.exit_codes import UsageError, usage
+from probdmp.cli.options import Columns, Json, check_output, names_of
+from probdmp.cli.output import print_json, print_line, print_table
+from probdmp.cli.progress import progress
+from probdmp.cli.recordings import read_files
+from probdmp.cli.summaries import by_name, common_units, name_text, primitive_summary
+from probdmp.cli.trajectories import with_unit
+from probdmp.errors import InputError
+
+if TYPE_CHECKING:
+    from probdmp.demonstrations import Demonstration
+    from probdmp.estimator import ProbabilisticDMP
+
+__all__ = ["fit"]
+
+
+def fit(
+    files: Annotated[list[Path], typer.Argument(metavar="FILE…", help="Demonstrations (.npz).", show_default=False)],
+    output: Annotated[
+        Path,
+        typer.Option(
+            "--output", "-o", metavar="MODEL", help="Model file to write, such as letters.probdmp.", show_default=False
+        ),
+    ],
+    label: Annotated[str | None, typer.Option(metavar="LABEL", help="Learn this movement only.")] = None,
+    columns: Columns = None,
+    n_basis: Annotated[int, typer.Option(metavar="N", help="Basis functions per degree of freedom.")] = 30,
+    forcing_noise: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME",
+            help="predictive: executions stray as the demonstrations do; posterior: only the mean is uncertain.",
+        ),
+    ] = "predictive",
+    discretization: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="exact (the default) or semi_implicit_euler."),
+    ] = None,
+    scaling: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="none (the default) or paper: the shape grows with the distance from start to goal.",
+        ),
+    ] = None,
+    smoothing: Annotated[
+        float,
+        typer.Option(
+            metavar="FRACTION",
+            help="Window of the smoothing filter, fraction of a demonstration, 0 to 0.5.",
+        ),
+    ] = 0.05,
+    published: Annotated[
+        bool,
+        typer.Option(
+            "--published",
+            help="The paper's configuration: semi_implicit_euler and its scaling.",
+        ),
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """Learn primitives and their failure detector from demonstrations.
+
+    One primitive for each label in the files; without labels, or with --label, a single one. The paper's failure detector
+    is fitted to the same demonstrations and saved with them, so that probdmp monitor can judge executions.
+    """
+    check_output(output, ".probdmp")
+    given = {"forcing_noise": forcing_noise, "discretization": discretization, "scaling": scaling}
+    settings = _settings({"n_basis": n_basis, "smoothing": smoothing, **given}, published)
+    from probdmp.detection import FailureDetector
+    from probdmp.estimator import PrimitiveLibrary
+    from probdmp.evaluation.experiment import group_by_label
+
+    demonstrations = group_by_label(read_files(files, names_of(columns), label))
+    library = PrimitiveLibrary(_learn(demonstrations, settings))
+    detector = FailureDetector().fit(library, demonstrations)
+    with usage():
+        library.save(output, detector)
+    summaries = [_summary(name, learned) for name, learned in library.items()]
+    if as_json:
+        print_json({"model": str(output), "primitives": summaries, "detector": detector.rule})
+    else:
+        _print_summaries(summaries)
+        print_line(f"Wrote {output}, with a failure detector (rule “{detector.rule}”).")
+
+
+def _settings(given: Mapping[str, Any], published: bool) -> dict[str, Any]:
+    """Constructor arguments of ProbabilisticDMP, checked before any file is read."""
+    from probdmp.dmp import Configuration
+    from probdmp.estimator import ProbabilisticDMP
+    from probdmp.learning import LearningOptions
+
+    chosen = {name: value for name, value in given.items() if value is not None}
+    if published and chosen.keys() & {"discretization", "scaling"}:
+        raise UsageError("--published, or --discretization and --scaling", "both", "The paper's configuration decides these.")
+    base = ProbabilisticDMP.as_published() if published else ProbabilisticDMP()
+    settings = base.get_params() | chosen
+    with usage():
+        Configuration(**{field.name: settings[field.name] for field in fields(Configuration)})
+        LearningOptions(smoothing=settings["smoothing"])
+    return settings
+
+
+def _learn(
+    demonstrations: Mapping[str, Sequence["Demonstration"]], settings: Mapping[str, Any]
+) -> dict[str, "ProbabilisticDMP"]:
+    from probdmp.estimator import ProbabilisticDMP
+
+    library = {}
+    with progress("Learning", len(demonstrations)) as done:
+        for label, members in demonstrations.items():
+            try:
+                library[label] = ProbabilisticDMP(**settings).fit(members)
+            except InputError as error:
+                raise InputError(f"{error.expected} for {label!r}", error.got, error.hint) from error
+            done(label)
+    return library
+
+
+def _summary(label: str, learned: "ProbabilisticDMP") -> dict[str, Any]:
+    """What was learned and how well; errors are fractions of the range."""
+    report, primitive = learned.fit_report_, learned.primitive_
+    assert report is not None, "just fitted"
+    errors, noise = report.reproduction_errors, report.observation_noise
+    return {
+        **primitive_summary(label, primitive),
+        "reproduction_error": float((errors**2).mean() ** 0.5),
+        "reproduction_errors": dict(zip(primitive.names, (errors**2).mean(axis=0) ** 0.5, strict=True)),
+        "em_converged": noise.converged,
+        "em_iterations": len(noise.log_likelihoods),
+    }
+
+
+def _print_summaries(summaries: Sequence[Mapping[str, Any]]) -> None:
+    scaling = any(s["not_scaled"] for s in summaries)
+    noise = with_unit("sensor noise\nstd", common_units(summaries))
+    columns = ["primitive", "demos", "duration\n[s]", "rms error\n[% of range]", noise, "EM\niterations"]
+    print_table(
+        [*columns, *(["not\nscaled"] if scaling else [])],
+        [
+            [
+                name_text(s["label"]),
+                str(s["demonstrations"]),
+                f"{s['duration']:.3f}",
+                f"{100 * s['reproduction_error']:.2f}",
+                ", ".join(by_name(s["sensor_noise_stds"])),
+                f"{s['em_iterations']}" + ("" if s["em_converged"] else ", not converged"),
+                *([", ".join(s["not_scaled"])] if scaling else []),
+            ]
+            for s in summaries
+        ],
+    )

@@ -1,0 +1,117 @@
+"""`probdmp inspect`: what a model file holds."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from probdmp.cli.options import Json, ModelFile
+from probdmp.cli.output import print_json, print_line, print_table
+from probdmp.cli.summaries import by_name, common_units, name_text, primitive_summary
+from probdmp.cli.trajectories import with_unit
+
+if TYPE_CHECKING:
+    from probdmp.detection import FailureDetector
+    from probdmp.io import ModelContents
+
+__all__ = ["inspect"]
+
+
+def inspect(model: ModelFile, as_json: Json = False) -> None:
+    """Show what a model file holds.
+
+    Its primitives with their configuration and sensor noise, the failure detector, and where all this comes from.
+
+    The file is checked first: that its digest, a SHA-256, belongs to its content. A damaged file gives exit code 3.
+    """
+    from probdmp.detection import FailureDetector
+    from probdmp.io import read_model
+
+    contents = read_model(model)
+    detector = None if contents.detector is None else FailureDetector.from_state(contents.detector, contents.primitives)
+    document = _document(model, contents, detector)
+    if as_json:
+        print_json(document)
+    else:
+        _print_document(document)
+
+
+def _document(model: Path, contents: "ModelContents", detector: "FailureDetector | None") -> dict[str, Any]:
+    from probdmp.io.model_file import SCHEMA
+
+    return {
+        "model": str(model),
+        "schema": SCHEMA,
+        "digest": "valid",  # or it would not have been read
+        "provenance": dict(contents.provenance),
+        "primitives": [
+            {**primitive_summary(label, primitive), "settings": contents.settings.get(label), "identity": primitive.identity}
+            for label, primitive in contents.primitives.items()
+        ],
+        "detector": None if detector is None else _detector_summary(detector),
+    }
+
+
+def _detector_summary(detector: "FailureDetector") -> dict[str, Any]:
+    """Thresholds by label, nats: the least log-likelihood in training and the level below which an execution has failed."""
+    thresholds = {label: detector.thresholds_[primitive.identity] for label, primitive in detector.primitives_.items()}
+    return {
+        "rule": detector.rule,
+        "likelihood": detector.likelihood,
+        "thresholds": {label: {**asdict(t), "level": t.level} for label, t in thresholds.items()},
+    }
+
+
+def _print_document(document: dict[str, Any]) -> None:
+    made = ", ".join(f"{name} {value}" for name, value in document["provenance"].items())
+    print_line(document["model"], style="bold")
+    print_line(f"Schema {document['schema']}, digest {document['digest']}, {made}")
+    primitives, detector = document["primitives"], document["detector"]
+    units = common_units(primitives)
+    print_table(
+        [
+            "primitive",
+            "demos",
+            "duration\n[s]",
+            "dt\n[s]",
+            with_unit("from\n", units),
+            with_unit("to\n", units),
+            with_unit("sensor noise\nstd", units),
+        ],
+        [
+            [
+                name_text(p["label"]),
+                str(p["demonstrations"]),
+                f"{p['duration']:.3f}",
+                f"{p['dt']:.4g}",
+                *("\n".join(by_name(p[key])) for key in ("start", "goal", "sensor_noise_stds")),
+            ]
+            for p in primitives
+        ],
+    )
+    for text, labels in _grouped({p["label"]: _configuration_text(p) for p in primitives}).items():
+        print_line(f"{labels}: {text}" if len(primitives) > 1 else text)
+    if detector is None:
+        print_line("No failure detector.")
+        return
+    print_line(f"Failure detector: rule “{detector['rule']}”, log-likelihood {detector['likelihood'].replace('_', ' ')}.")
+    print_table(
+        ["primitive", "least in training [nats]", "failed below [nats]"],
+        [[name_text(label), f"{t['minimum']:.2f}", f"{t['level']:.2f}"] for label, t in detector["thresholds"].items()],
+    )
+
+
+def _configuration_text(primitive: dict[str, Any]) -> str:
+    values = primitive["configuration"]
+    left_out = f" (not {', '.join(primitive['not_scaled'])})" if primitive["not_scaled"] else ""
+    return (
+        f"{values['n_basis']} basis functions, {values['discretization']}, scaling {values['scaling']}{left_out}, "
+        f"forcing noise {values['forcing_noise']}, alpha_z {values['alpha_z']:g}"
+    )
+
+
+def _grouped(texts: dict[str, str]) -> dict[str, str]:
+    """Labels, joined, by the text they share."""
+    groups: dict[str, list[str]] = {}
+    for label, text in texts.items():
+        groups.setdefault(text, []).append(name_text(label))
+    return {text: ", ".join(labels) for text, labels in groups.items()}

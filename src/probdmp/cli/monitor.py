@@ -1,0 +1,115 @@
+"""`probdmp monitor`: is an execution still the movement that was taught?"""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from probdmp.cli.exit_codes import FAILURE_DETECTED, UsageError
+from probdmp.cli.options import Duration, Goal, Json, Label, ModelFile, Start, StartVelocity, TaskOptions
+from probdmp.cli.output import print_json, print_line
+from probdmp.cli.recordings import primitive_of, read_executions
+from probdmp.cli.stream import StreamOptions, monitor_stream
+from probdmp.cli.summaries import name_text
+from probdmp.errors import ModelFileError
+
+if TYPE_CHECKING:
+    from probdmp.detection import FailureDetector, Verdict
+    from probdmp.estimator import PrimitiveLibrary
+
+__all__ = ["monitor"]
+
+
+def monitor(
+    model: ModelFile,
+    execution: Annotated[
+        str, typer.Argument(metavar="EXECUTION|-", help="Recorded executions (.npz), or - for JSON lines.", show_default=False)
+    ],
+    label: Label = None,
+    start: Start = None,
+    goal: Goal = None,
+    duration: Duration = None,
+    start_velocity: StartVelocity = None,
+    dt: Annotated[
+        float | None,
+        typer.Option(metavar="S", help="With JSON lines: seconds between ticks. Default: as learned."),
+    ] = None,
+    on_alarm: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="With JSON lines, after an alarm: continue (the default), or hold: rest where the movement should then be.",
+        ),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Judge executions; exit code 4 if one has failed.
+
+    For a file, a verdict on each recording. With - in its place, one execution as it happens: a JSON object per line and
+    tick on standard input, and one on standard output with the state to reach at the next tick.
+
+    In: {"position": [1.5, null], "time": 0.01} in data units and seconds. null: not measured; time may be left out.
+
+    First, perhaps: {"task": {"start": [0, 0], "goal": [1, 2], "duration": 1.2, "dt": 0.01, "label": "a"}}, any of these.
+    Unless given, the start is the first position and the rest is as learned.
+
+    Out: time, position, velocity, acceleration, log_likelihood (nats), test_ratio (above 1: alarm), failed.
+    """
+    from probdmp.estimator import PrimitiveLibrary, load_detector
+
+    library, detector = PrimitiveLibrary.load(model), load_detector(model)
+    if detector is None:
+        hint = "Learn it with probdmp fit, which saves one, or give save() a fitted FailureDetector."
+        raise ModelFileError(f"a failure detector in {str(model)!r}", "a model without one", hint)
+    task = TaskOptions(start, goal, duration, start_velocity)
+    if execution == "-":
+        failed = monitor_stream(library, detector, StreamOptions(label, task, dt, on_alarm or "continue"))
+    elif dt is not None or on_alarm is not None:
+        raise UsageError("--dt and --on-alarm with JSON lines only", f"them with {execution!r}", "A file has its own dt.")
+    else:
+        failed = _monitor_file(Path(execution), library, detector, label, task, as_json)
+    raise typer.Exit(FAILURE_DETECTED if failed else 0)
+
+
+def _monitor_file(
+    path: Path, library: "PrimitiveLibrary", detector: "FailureDetector", label: str | None, task: TaskOptions, as_json: bool
+) -> bool:
+    """Judge the recordings of a file and print the verdicts; whether any failed."""
+    from probdmp.execution import task_of_recording
+
+    recordings = read_executions(path, library, label)
+    asked = []
+    for recording in recordings:
+        primitive = primitive_of(library, recording)[1].primitive_
+        asked.append(task_of_recording(primitive, recording, **task.arguments(primitive)))
+    labels = [recording.label for recording in recordings]
+    verdicts = detector.verdicts(recordings, tasks=asked)
+    if as_json:
+        executions = [_as_dict(*judged) for judged in zip(labels, range(len(labels)), verdicts, strict=True)]
+        print_json({"executions": executions, "failed": sum(verdict.failed for verdict in verdicts)})
+    else:
+        _print_verdicts(labels, verdicts)
+    return any(verdict.failed for verdict in verdicts)
+
+
+def _as_dict(label: str, index: int, verdict: "Verdict") -> dict[str, Any]:
+    return {
+        "label": label,
+        "index": index,
+        "failed": verdict.failed,
+        "time": verdict.time,
+        "phase": verdict.phase,
+        "step": verdict.step,
+        "test_ratio": verdict.test_ratio,
+        "contributions": dict(zip(verdict.names, verdict.contributions, strict=True)),
+    }
+
+
+def _print_verdicts(labels: Sequence[str], verdicts: "Sequence[Verdict]") -> None:
+    """One line for each, the failed ones in red, and a count."""
+    width, digits = max(map(len, map(name_text, labels))), len(str(len(labels) - 1))
+    for index, (label, verdict) in enumerate(zip(labels, verdicts, strict=True)):
+        print_line(f"{name_text(label):<{width}} {index:>{digits}}  {verdict}", style="red" if verdict.failed else "")
+    n_failed = sum(verdict.failed for verdict in verdicts)
+    print_line(f"{n_failed} of {len(verdicts)} executions failed.", style="bold")

@@ -1,0 +1,125 @@
+"""Options that several verbs share: their names, help and meaning."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from probdmp.cli.exit_codes import UsageError, usage
+
+if TYPE_CHECKING:
+    from probdmp.dmp import Primitive
+
+__all__ = [
+    "Columns",
+    "Duration",
+    "ExecutionFile",
+    "Goal",
+    "Index",
+    "Json",
+    "Label",
+    "ModelFile",
+    "OutputArrays",
+    "Seed",
+    "Start",
+    "StartVelocity",
+    "TaskOptions",
+    "check_output",
+    "names_of",
+]
+
+POINT = "X,Y,…"
+
+ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="Model file made by probdmp fit.", show_default=False)]
+ExecutionFile = Annotated[
+    Path, typer.Argument(metavar="EXECUTION", help="Recorded executions, a demonstrations file (.npz).", show_default=False)
+]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON document, missing numbers as null.")]
+Label = Annotated[
+    str | None, typer.Option("--label", metavar="LABEL", help="Which primitive, and the recordings with its label.")
+]
+Index = Annotated[int, typer.Option("--index", min=0, metavar="I", help="Which recording, from 0; with --label, of those.")]
+Columns = Annotated[
+    str | None,
+    typer.Option("--columns", metavar="NAMES", help="Columns that are positions, such as x,y. Default: x, y, z and q…."),
+]
+Seed = Annotated[int, typer.Option("--seed", min=0, metavar="N", help="Decides all that is random.")]
+
+Start = Annotated[
+    str | None,
+    typer.Option("--start", metavar=POINT, help="Start position, data units. Default: a recording's own, or as learned."),
+]
+Goal = Annotated[str | None, typer.Option("--goal", metavar=POINT, help="Goal position, data units. Default: as learned.")]
+Duration = Annotated[
+    float | None, typer.Option("--duration", metavar="S", help="Seconds. Default: a recording's own, or as learned.")
+]
+StartVelocity = Annotated[
+    str | None,
+    typer.Option("--start-velocity", metavar=POINT, help="Velocity at the start, data units per second. Default: as learned."),
+]
+OutputArrays = Annotated[
+    Path | None,
+    typer.Option("--output", "-o", metavar="FILE.npz", help="Write times, means and stds as arrays (T, D) to this file."),
+]
+
+
+@dataclass(frozen=True, slots=True)
+class TaskOptions:
+    """What the command line says about a task; None: as learned, or the recording's own."""
+
+    start: str | None
+    goal: str | None
+    duration: float | None
+    start_velocity: str | None
+
+    def arguments(self, primitive: "Primitive") -> dict[str, Any]:
+        """Keyword arguments for rollout, track, smooth and execute, checked against the primitive.
+
+        Raises
+        ------
+        UsageError
+            If they are no numbers, or do not fit.
+        """
+        from probdmp.dmp import task_for
+
+        given: dict[str, Any] = {
+            "start": _numbers(self.start, "--start"),
+            "goal": _numbers(self.goal, "--goal"),
+            "duration": self.duration,
+            "start_velocity": _numbers(self.start_velocity, "--start-velocity"),
+        }
+        with usage():
+            task_for(primitive, **given)
+        return given
+
+
+def names_of(text: str | None) -> Sequence[str] | None:
+    """Names from a list with commas."""
+    return None if text is None else [name.strip() for name in text.split(",")]
+
+
+def check_output(path: Path | None, suffix: str) -> None:
+    """Refuse a place that cannot be written before the work is done, not after.
+
+    Raises
+    ------
+    UsageError
+        If the suffix is another or the folder does not exist.
+    """
+    if path is None:
+        return
+    if path.suffix != suffix:
+        raise UsageError(f"an output file that ends in {suffix}", repr(str(path)))
+    if not path.parent.is_dir():
+        raise UsageError("an output file in a folder that exists", repr(str(path)), f"Make it first: mkdir -p {path.parent}")
+
+
+def _numbers(text: str | None, option: str) -> list[float] | None:
+    if text is None:
+        return None
+    try:
+        return [float(number) for number in text.split(",")]
+    except ValueError as error:
+        raise UsageError(f"{option} as numbers with commas between, such as 1.5,-2", repr(text)) from error

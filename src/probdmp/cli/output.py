@@ -1,0 +1,87 @@
+"""What reaches standard output: one JSON document, or lines and tables for people."""
+
+import json
+import math
+import os
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+__all__ = ["json_line", "plain", "print_json", "print_line", "print_table", "printable"]
+
+PIPE_WIDTH = 160
+"""Columns where there is no terminal to ask: wide enough for tables not to be squeezed."""
+
+
+def plain(value: Any) -> Any:
+    """Values that JSON can hold: NumPy's as lists and numbers, NaN and infinities as None."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {key: plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    return plain(value.tolist()) if hasattr(value, "tolist") else value
+
+
+def json_line(document: Any) -> str:
+    """JSON on one line, with its end."""
+    return json.dumps(plain(document), allow_nan=False) + "\n"
+
+
+def print_json(document: Any) -> None:
+    """The one document of `--json`."""
+    sys.stdout.write(json_line(document))
+
+
+def print_line(text: str = "", style: str = "") -> None:
+    """A line; a terminal that is too narrow gets it in several."""
+    _console().print(printable(text), style=style or None, soft_wrap=not sys.stdout.isatty())
+
+
+def print_table(columns: Sequence[str], rows: Iterable[Sequence[str]], title: str = "", second_lines: str = "") -> None:
+    """A table: the first column to the left, the others, which are numbers, to the right.
+
+    Parameters
+    ----------
+    rows : one text per column.
+    second_lines : style of all but the first line of a cell.
+    """
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(
+        title=Text(printable(title)) if title else None,
+        title_justify="left",
+        box=box.SIMPLE_HEAD,
+        pad_edge=False,
+        title_style="bold",
+    )
+    for i, column in enumerate(columns):
+        table.add_column(Text(printable(column)), justify="right" if i else "left", vertical="top")
+    for row in rows:
+        heads_and_rests = [printable(cell).partition("\n") for cell in row]
+        table.add_row(*(Text.assemble(head, (line_end + rest, second_lines)) for head, line_end, rest in heads_and_rests))
+    _console().print(table)
+
+
+def printable(text: str) -> str:
+    """Text from a file without what could steer a terminal."""
+    return "".join(character if character.isprintable() or character == "\n" else "�" for character in text)
+
+
+def _console() -> "Console":
+    from rich.console import Console
+
+    known = sys.stdout.isatty() or "COLUMNS" in os.environ
+    return Console(
+        highlight=False,
+        markup=False,
+        emoji=False,
+        color_system=None if os.environ.get("NO_COLOR") else "auto",
+        width=None if known else PIPE_WIDTH,
+    )

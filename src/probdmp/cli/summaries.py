@@ -1,0 +1,51 @@
+"""What a primitive is, for people and as a JSON object; `fit` and `inspect` say the same."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from probdmp.dmp import Primitive
+
+__all__ = ["by_name", "common_units", "name_text", "not_scaled", "primitive_summary"]
+
+
+def primitive_summary(label: str, primitive: "Primitive") -> dict[str, Any]:
+    """Durations in seconds, positions and noise in data units, by degree of freedom where they differ."""
+    names = primitive.names
+    return {
+        "label": label,
+        "names": list(names),
+        "units": primitive.units,
+        "demonstrations": primitive.n_demonstrations,
+        "duration": primitive.duration,
+        "dt": primitive.dt,
+        "start": dict(zip(names, primitive.start, strict=True)),
+        "goal": dict(zip(names, primitive.goal, strict=True)),
+        "sensor_noise_stds": dict(zip(names, primitive.observation_variances**0.5, strict=True)),
+        "not_scaled": not_scaled(primitive),
+        "configuration": asdict(primitive.configuration),
+    }
+
+
+def not_scaled(primitive: "Primitive") -> list[str]:
+    """Degrees of freedom that the paper's scaling leaves out, since the demonstrations hardly move from start to goal."""
+    if primitive.configuration.scaling == "none":
+        return []
+    return [name for name, scaled in zip(primitive.names, primitive.scaled, strict=True) if not scaled]
+
+
+def by_name(values: Mapping[str, float]) -> list[str]:
+    """Numbers with the names they belong to, such as `x 1.25`."""
+    return [f"{name} {value:.3g}" for name, value in values.items()]
+
+
+def common_units(summaries: Sequence[Mapping[str, Any]]) -> str:
+    """The unit that all primitives share, for headings; nothing if they differ."""
+    units = {summary["units"] for summary in summaries}
+    return str(units.pop()) if len(units) == 1 else ""
+
+
+def name_text(label: str) -> str:
+    """A label for people; a primitive may have none."""
+    return label or "(no label)"

@@ -1,0 +1,36 @@
+"""How far a movement reaches: the unit in which everything unit-free is measured."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from probdmp.checks import FloatArray
+from probdmp.demonstrations.demonstration import Demonstration
+from probdmp.errors import InputError
+
+__all__ = ["mean_ranges"]
+
+RANGES = (1e-40, 1e40)
+"""Least and largest, data units: precisions and variances must stay finite."""
+STILL = 1e-12
+"""A degree of freedom that moves less than this fraction of its distance from zero has moved by rounding."""
+
+
+def mean_ranges(demonstrations: Sequence[Demonstration]) -> FloatArray:
+    """Mean extent of each degree of freedom over the demonstrations, (D,) array, data units, > 0.
+
+    A degree of freedom that never moves takes the largest range of the others; if none moves, its distance from zero, or 1.
+
+    Raises
+    ------
+    InputError
+        If a range is so small or large that its square would not be finite.
+    """
+    extents = np.mean([np.nanmax(d.positions, axis=0) - np.nanmin(d.positions, axis=0) for d in demonstrations], axis=0)
+    magnitude = float(np.nanmax([np.nanmax(np.abs(d.positions)) for d in demonstrations]))
+    still = extents <= STILL * magnitude
+    ranges = np.where(still, (magnitude or 1.0) if still.all() else extents.max(), extents)
+    if not RANGES[0] <= ranges.min() <= ranges.max() <= RANGES[1]:
+        got = f"from {ranges.min():g} to {ranges.max():g}"
+        raise InputError(f"movement over {RANGES[0]:g} to {RANGES[1]:g} units", got, "Rescale the data, to metres say.")
+    return np.asarray(ranges)

@@ -1,0 +1,34 @@
+"""How to learn, and how well it went."""
+
+from dataclasses import dataclass
+
+from probdmp.checks import FloatArray, check_choice, check_fraction
+from probdmp.learning.observation_noise import ObservationNoise
+
+__all__ = ["FitReport", "LearningOptions"]
+
+WEIGHT_MODELS = ("pooled",)
+
+
+@dataclass(frozen=True, slots=True)
+class LearningOptions:
+    """How to learn, beside what to learn (`probdmp.dmp.Configuration`)."""
+
+    weight_model: str = "pooled"
+    """`"pooled"`: one set of weights behind all demonstrations, found by Bayesian regression (the paper)."""
+    smoothing: float = 0.05
+    """Window of the Savitzky-Golay filter as a fraction of a demonstration; see `probdmp.demonstrations.smoothing`."""
+
+    def __post_init__(self) -> None:
+        check_choice(self.weight_model, "weight_model", WEIGHT_MODELS)
+        object.__setattr__(self, "smoothing", check_fraction(self.smoothing, "smoothing", most=0.5))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FitReport:
+    """How well the primitive says what it was shown."""
+
+    reproduction_errors: FloatArray
+    """(K, D) array: root mean square of demonstration minus rollout of the same task, as a fraction of the range."""
+    observation_noise: ObservationNoise
+    """The EM iterations behind R."""

@@ -1,0 +1,22 @@
+"""What all tests share: how many examples hypothesis tries, and where real recordings are."""
+
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, settings
+
+settings.register_profile("fast", max_examples=50, deadline=None, derandomize=True)
+settings.register_profile("thorough", max_examples=20_000, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "fast"))
+
+
+@pytest.fixture(scope="session")
+def recordings() -> Path:
+    """The folder of real recordings, on machines that have it."""
+    place = os.environ.get("PROBDMP_RECORDINGS")
+    if not place:
+        pytest.skip("needs real recordings: set the environment variable PROBDMP_RECORDINGS to their folder")
+    folder = Path(place)
+    assert folder.is_dir(), f"PROBDMP_RECORDINGS names {folder}, which is not a folder"
+    return folder
