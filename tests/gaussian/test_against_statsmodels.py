@@ -27,7 +27,8 @@ def statsmodels_smoother(system):
     return model
 
 
-def assert_agreement(model, observations):
+def assert_agreement(model, observations, tolerance=1e-9):
+    """tolerance : of states, in marginal standard deviations."""
     filtered, smoothed = filter_sequence(model, observations), smooth_sequence(model, observations)
     rollout = filter_sequence(model).filtered
     for index in np.ndindex(model.batch_shape):
@@ -40,9 +41,9 @@ def assert_agreement(model, observations):
         np.testing.assert_allclose(log_likelihoods, result.llf_obs, rtol=1e-9, atol=1e-9)
         stds = marginal_stds(rollout.covariances[at])
         theirs = result.filtered_state.T, np.moveaxis(result.filtered_state_cov, -1, 0)
-        assert deviation_in_stds(filtered.filtered.means[at], filtered.filtered.covariances[at], theirs, stds) <= 1e-9
+        assert deviation_in_stds(filtered.filtered.means[at], filtered.filtered.covariances[at], theirs, stds) <= tolerance
         theirs = result.smoothed_state.T, np.moveaxis(result.smoothed_state_cov, -1, 0)
-        assert deviation_in_stds(smoothed.means[at], smoothed.covariances[at], theirs, stds) <= 1e-9
+        assert deviation_in_stds(smoothed.means[at], smoothed.covariances[at], theirs, stds) <= tolerance
 
 
 @pytest.mark.parametrize("missing", [0.0, 0.3])
@@ -51,7 +52,8 @@ def assert_agreement(model, observations):
 def test_movement(variance, scheme, missing):
     rng = np.random.default_rng(0)
     model = dmp_system(rng, n_dof=3, n_steps=300, observation_variances=np.full(3, variance), discretization=scheme)
-    assert_agreement(model, draw_observations(model, rng, missing))
+    # statsmodels does not update in Joseph form: at R = 1e-12 it is the less exact of the two.
+    assert_agreement(model, draw_observations(model, rng, missing), tolerance=1e-9 if variance > 1e-12 else 1e-8)
 
 
 @pytest.mark.parametrize("known_start", [False, True], ids=["uncertain start", "known start"])

@@ -294,10 +294,10 @@ def test_step_by_step_is_the_same_as_all_at_once(model, seed):
 # --- covariances stay covariances -------------------------------------------------------------------------------------
 
 
-def four_corners(rng, n_steps, scheme, copies=1, **changes):
+def four_corners(rng, n_steps, scheme, copies=1):
     """(copies, 4) systems that go on for many durations: R and the forcing variance each either tiny or large."""
     noise, variances = np.array([1e-8, 1e-8, 1.0, 1.0]), np.array([1e-12, 1e-2, 1e-12, 1e-2])
-    model = dmp_system(rng, n_dof=4, n_steps=101, discretization=scheme, observation_variances=variances, **changes)
+    model = dmp_system(rng, n_dof=4, n_steps=101, discretization=scheme, observation_variances=variances)
     inputs = np.resize(model.inputs, (n_steps - 1, copies, 4, 1))
     covariance = noise[:, None, None] * 156.25**2  # (alpha_z^2 / 4)^2: a forcing term that moves the attractor by one unit
     return replace(model, inputs=inputs, input_covariances=np.broadcast_to(covariance, (n_steps - 1, 1, 4, 1, 1)))
@@ -343,22 +343,32 @@ def test_covariances_stay_symmetric_and_positive_over_ten_million_steps(scheme):
         step = update(mean, covariance, observation, model.observation_matrix, model.observation_covariance)
         mean, covariance = step.mean, step.covariance
         assert np.array_equal(covariance, covariance.mT)
-        if t % 5 == 0:
-            assert least_scaled_eigenvalue(covariance) > -1e-12
+        assert least_scaled_eigenvalue(covariance) > -1e-12
     assert np.all(np.isfinite(mean))
 
 
-def test_known_start_gives_covariances_without_negative_eigenvalues_to_rounding():
-    """After the first step all spread is along one line; beside it is the rounding of what the step brought."""
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_spread_along_one_line_leaves_only_rounding_beside_it(scheme):
+    """After a known start and one step the covariance has rank one, and an observation shrinks it up to 1e12 times."""
+    covariances, before = known_start_run(scheme)
+    stds = marginal_stds(before)
+    scaled = covariances / (stds[..., :, None] * stds[..., None, :])
+    assert np.linalg.eigvalsh(scaled).min() > -1e-12
+
+
+@pytest.mark.xfail(reason="R = 1e-12, Q = 1, known start: rounding of the prediction is 1e-9 of what the observation leaves")
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_spread_along_one_line_stays_positive_at_its_own_scale(scheme):
+    assert least_scaled_eigenvalue(known_start_run(scheme)[0]) > -1e-12
+
+
+def known_start_run(scheme):
+    """Filtered covariances of the four corners and those of their rollout, from the first step on."""
     rng = np.random.default_rng(0)
-    for scheme in SCHEMES:
-        model = four_corners(rng, n_steps=50, scheme=scheme, start_covariances=np.zeros((4, 2, 2)))
-        observations = draw_observations(model, rng)
-        covariances = filter_sequence(model, observations).filtered.covariances[1:, 0]
-        before = filter_sequence(model).filtered.covariances[1:, 0]
-        stds = marginal_stds(before)
-        scaled = covariances / (stds[..., :, None] * stds[..., None, :])
-        assert np.linalg.eigvalsh(scaled).min() > -1e-12
+    model = four_corners(rng, n_steps=50, scheme=scheme)
+    model = replace(model, initial_covariance=np.zeros((3, 3)))
+    filtered, rollout = filter_sequence(model, draw_observations(model, rng)).filtered, filter_sequence(model).filtered
+    return filtered.covariances[1:, 0], rollout.covariances[1:, 0]
 
 
 @given(systems(), seeds)

@@ -7,15 +7,16 @@ import pytest
 from paper import equations as paper
 from reference import dense_posterior, system_at
 from scipy.optimize import minimize_scalar
-from strategies import draw_observations, dmp_system, make_primitive
+from strategies import draw_observations, make_primitive
 
 from probdmp import ProbabilisticDMP
-from probdmp.dmp import Configuration, Primitive, demonstrated_tasks, linear_gaussian_model, task_for
+from probdmp.dmp import Configuration, Primitive, Task, demonstrated_tasks, linear_gaussian_model, task_for
+from probdmp.dmp.transformation_system import DISCRETIZATIONS
 from probdmp.execution import roll_out
 from probdmp.gaussian import filter_sequence
 from probdmp.learning import LearningOptions, estimate_observation_noise, fit_primitive
+from probdmp.learning.forcing_targets import forcing_targets
 from probdmp.learning.observation_noise import maximize_observation_noise
-
 
 # --- the forcing term by Bayesian regression --------------------------------------------------------------------------
 
@@ -64,30 +65,177 @@ def test_alpha_and_beta_make_the_demonstrations_likeliest(regression):
     """The paper names alpha and beta among the parameters and not where they come from: they maximise ln N(f | 0, ...)."""
     primitive, data = regression
 
-    def log_evidence(Phi, f, alpha, beta):
-        covariance = Phi @ Phi.T / alpha + np.eye(len(f)) / beta
-        return -0.5 * (f @ np.linalg.solve(covariance, f) + np.linalg.slogdet(2 * np.pi * covariance)[1])
-
     for d, (Phi, f) in enumerate(data):
         alpha, beta = primitive.weight_precisions[d], primitive.forcing_precisions[d]
-        best = log_evidence(Phi, f, alpha, beta)
+        # f ~ N(0, Phi Phi^T / alpha + 1 / beta): independent along the left singular vectors of Phi, and across them
+        vectors, singular, _ = np.linalg.svd(Phi, full_matrices=False)
+        along = vectors.T @ f
+        across, n_across = f @ f - along @ along, len(f) - len(along)
+
+        def log_evidence(alpha, beta, along=along, variances=singular**2, across=across, n_across=n_across):
+            noise = n_across * paper.log_normal(0.0, 0.0, 1 / beta) - 0.5 * beta * across
+            return noise + sum(paper.log_normal(a, 0.0, v / alpha + 1 / beta) for a, v in zip(along, variances, strict=True))
+
+        best = log_evidence(alpha, beta)
         for factor in (0.9, 1.1):
-            assert log_evidence(Phi, f, factor * alpha, beta) < best
-            assert log_evidence(Phi, f, alpha, factor * beta) < best
+            assert log_evidence(factor * alpha, beta) < best
+            assert log_evidence(alpha, factor * beta) < best
+
+
+@pytest.mark.parametrize("scheme", ["semi_implicit_euler", "exact"])
+@pytest.mark.parametrize("duration", [0.5, 3.0])
+def test_forcing_targets_make_the_movement_they_were_read_from(scheme, duration):
+    """Similar to regular DMPs: f is what the equations, solved for it, say it was. A path of the scheme returns to 1e-10."""
+    configuration, dt = Configuration(discretization=scheme), duration / 150
+    truth = make_primitive(np.random.default_rng(1), n_basis=10, discretization=scheme)
+    path = roll_out(truth, task_for(truth, duration=duration), dt)
+    other_goal = path.positions[-1]  # the goal of a recording is where it ends
+    targets = forcing_targets(path.positions, path.velocities, other_goal, dt, configuration)
+    step = DISCRETIZATIONS[scheme].step(25.0, np.asarray(duration), np.asarray(dt))
+    for d in range(2):
+        state = path.means[0, d]
+        for t in range(1, 151):
+            state = step.transition @ state + step.input_vector * (25.0 * 25.0 / 4 * other_goal[d] + targets[t - 1, d])
+            np.testing.assert_allclose(state[1:] * [duration, 1], path.means[t, d, 1:] * [duration, 1], atol=1e-10)
 
 
 @pytest.mark.parametrize("scheme", ["semi_implicit_euler", "exact"])
 def test_each_demonstration_has_its_own_start_goal_and_duration(scheme):
-    """K demonstrations of the same primitive: made by one set of weights for different tasks, they give back these weights' paths."""
-    truth = make_primitive(np.random.default_rng(1), n_basis=10, discretization=scheme, duration=1.0)
-    rng, tasks, paths = np.random.default_rng(2), [], []
-    for _ in range(3):
+    """Given K demonstrations of the same motion primitive: one set of weights makes them all, whatever their tasks were."""
+    truth, rng = make_primitive(np.random.default_rng(1), n_basis=10, discretization=scheme), np.random.default_rng(2)
+    paths = []
+    for duration in (0.8, 1.0, 1.4):
         start, goal = rng.uniform(-1, 1, (2, 2))
-        tasks.append(task_for(truth, start, goal, float(rng.choice([0.8, 1.0, 1.4]))))
-        paths.append(roll_out(truth, tasks[-1], 0.002))
-    unforced = ProbabilisticDMP(10, discretization=scheme, smoothing=0.0).fit([path.positions for path in paths], dt=0.002)
-    for task, path in zip(tasks, paths, strict=True):
-        velocity = path.velocities[0]
-        goal = path.positions[-1]
-        own = roll_out(unforced.primitive_, task_for(unforced.primitive_, task.start, goal, float(task.duration), velocity), 0.002)
-        assert np.abs(own.positions - path.positions).max() < 0.1
+        paths.append(roll_out(truth, task_for(truth, start, goal, duration), 0.002).positions)
+    learned = ProbabilisticDMP(10, discretization=scheme, smoothing=0.0).fit(paths, dt=0.002)
+    assert learned.fit_report_.reproduction_errors.max() < 0.02
+
+
+def test_the_parameters_of_a_primitive():
+    """theta_primitive = {mu_w, Sigma_w, alpha, beta, R} fully describes the representation: nothing else is learned from shape.
+
+    Any other array of a `Primitive` belongs to the task, to the units or to the start.
+    """
+    theta = {"weight_means", "weight_covariances", "weight_precisions", "forcing_precisions", "observation_variances"}
+    task = {"start", "goal", "goal_displacements", "start_velocities", "start_covariances", "ranges"}
+    plain = {"configuration", "duration", "dt", "phase_step", "n_demonstrations", "names", "units"}
+    assert {field.name for field in fields(Primitive)} == theta | task | plain
+
+
+# --- the sensor noise by expectation maximisation ---------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def demonstrated():
+    """A system of K = 3 demonstrations and D = 2 degrees of freedom, and what it has observed, some of it missing."""
+    rng = np.random.default_rng(3)
+    primitive = make_primitive(rng, 2, observation_variances=np.array([1e-3, 4e-3]))
+    model = linear_gaussian_model(primitive, tasks_of(primitive, rng), 0.02, 16)
+    return model, draw_observations(model, rng, missing=0.1)[..., 0]
+
+
+def tasks_of(primitive, rng):
+    """Three tasks as one batch."""
+    starts, goals = rng.uniform(-1, 1, (2, 3, 2))
+    return Task(starts, goals, np.array([0.3, 0.35, 0.4]))
+
+
+def with_noise(model, variances):
+    """The model with another R."""
+    return replace(model, observation_covariance=np.asarray(variances)[:, None, None])
+
+
+def expected_log_likelihood(posteriors, observations, R):
+    """The part of E[ln p(P, S)] that depends on R: sum_k sum_t E[ln N(o_t^k | C s_t^k, R)], under the smoothed states.
+
+    The other two terms, ln N(s_1 | 0, Q_0) and ln N(s_t | A s_{t-1} + B u_{t-1}, Q_t), do not contain R. The latter is no
+    density on R^3 at all, as Q_t has rank one; it need not be evaluated.
+    """
+    total = 0.0
+    for posterior, o in zip(posteriors, observations, strict=True):
+        means, covariances = posterior.smoothed
+        for t in np.flatnonzero(~np.isnan(o)):
+            total += paper.log_normal(o[t], means[t, 2], R) - 0.5 * covariances[t, 2, 2] / R
+    return total
+
+
+def test_complete_data_log_likelihood_is_maximised_by_the_M_step(demonstrated):
+    """ln p(P, S | tau, g) = sum_k sum_t ln N(o_t^k | C s_t^k, R) + ...; its expectation Q(theta, theta_old), maximised over R.
+
+    By brute force: the states from the dense joint Gaussian of each demonstration, the maximum by numerical search.
+    """
+    model, observations = demonstrated
+    for R_old in (np.array([1e-3, 4e-3]), np.array([1e-2, 1e-4])):
+        current = with_noise(model, R_old)
+        ours = maximize_observation_noise(current, observations, filter_sequence(current, observations[..., None]))
+        for d in range(2):
+            posteriors = [dense_posterior(system_at(current, (k, d)), observations[:, k, d, None]) for k in range(3)]
+            search = minimize_scalar(
+                lambda ln_R, p=posteriors, d=d: -expected_log_likelihood(p, observations[:, :, d].T, np.exp(ln_R)),
+                bounds=(np.log(R_old[d]) - 8, np.log(R_old[d]) + 8),
+                method="bounded",
+                options={"xatol": 1e-9},
+            )
+            assert ours[d] == pytest.approx(np.exp(search.x), rel=1e-6)
+
+
+def test_an_EM_iteration_never_lowers_the_likelihood(demonstrated):
+    """EM iterates between the posterior of the hidden state and the maximum of the expected log-likelihood.
+
+    Counted by brute force: the log density of all that was observed, under the dense joint Gaussian.
+    """
+    model, observations = demonstrated
+    R, before = np.array([1e-1, 1e-5]), np.full(2, -np.inf)
+    for _ in range(6):
+        current = with_noise(model, R)
+        after = np.array(
+            [
+                sum(dense_posterior(system_at(current, (k, d)), observations[:, k, d, None]).log_likelihood for k in range(3))
+                for d in range(2)
+            ]
+        )
+        assert np.all(after >= before - 1e-9 * np.abs(after))
+        R = maximize_observation_noise(current, observations, filter_sequence(current, observations[..., None]))
+        before = after
+
+
+def test_EM_ends_where_the_likelihood_is_largest(demonstrated):
+    """The updates for R can be derived by setting the derivative to 0: at the end that of the log-likelihood itself is 0."""
+    model, observations = demonstrated
+    guesses = [np.array([1e-1, 1e-1])]
+    found = estimate_observation_noise(model, observations, guesses, floor=np.full(2, 1e-12), tolerance=1e-4)
+    assert found.converged
+
+    def log_likelihood(R):
+        return filter_sequence(with_noise(model, R), observations[..., None]).log_likelihoods.sum()
+
+    best = log_likelihood(found.variances)
+    for factors in ([0.97, 1], [1.03, 1], [1, 0.97], [1, 1.03]):
+        assert log_likelihood(found.variances * factors) < best
+
+
+@pytest.mark.parametrize("forcing_noise", ["predictive", "posterior"])
+@pytest.mark.parametrize("configuration", ["published", "default"])
+def test_EM_never_lowers_the_likelihood_while_learning(letters, configuration, forcing_noise):
+    """As learned from recordings: the log-likelihood of the demonstrations at each iteration, and it converges."""
+    learned = ProbabilisticDMP(forcing_noise=forcing_noise)
+    if configuration == "published":
+        learned = ProbabilisticDMP.as_published(forcing_noise=forcing_noise)
+    noise = learned.fit(letters["s"][:10]).fit_report_.observation_noise
+    history = noise.log_likelihoods
+    assert np.all(np.diff(history) >= -1e-9 * np.abs(history[1:]))
+    assert noise.converged
+    np.testing.assert_array_equal(noise.variances, learned.primitive_.observation_variances)
+
+
+def test_R_is_recovered_from_demonstrations_of_the_model():
+    """What EM is for: the noise that a sensor was simulated with, to 5 % from 200 demonstrations."""
+    rng = np.random.default_rng(4)
+    truth = np.array([1e-3, 4e-3])
+    primitive = make_primitive(rng, 2, observation_variances=truth)
+    task = task_for(primitive)
+    tasks = Task(np.tile(task.start, (200, 1)), np.tile(task.goal, (200, 1)), np.full(200, float(task.duration)))
+    model = linear_gaussian_model(primitive, tasks, primitive.duration / 30, 31)
+    observations = draw_observations(model, rng)[..., 0]
+    found = estimate_observation_noise(model, observations, [np.full(2, 1e-1)], floor=np.full(2, 1e-12))
+    np.testing.assert_allclose(found.variances, truth, rtol=0.05)

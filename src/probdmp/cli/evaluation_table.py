@@ -57,4 +57,4 @@ def _cells(summary: "Summary", fault: str) -> list[str]:
 def _rate(rate: "Rate | None") -> str:
     if rate is None:
         return "–"
-    return f"{rate.count}/{rate.n}  {100 * rate.rate:.1f} %\n{100 * rate.low:.1f}–{100 * rate.high:.1f} %"
+    return f"{rate.count}/{rate.n} {100 * rate.rate:.1f} %\n{100 * rate.low:.1f}–{100 * rate.high:.1f} %"

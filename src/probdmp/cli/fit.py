@@ -152,7 +152,7 @@ def _print_summaries(summaries: Sequence[Mapping[str, Any]]) -> None:
                 str(s["demonstrations"]),
                 f"{s['duration']:.3f}",
                 f"{100 * s['reproduction_error']:.2f}",
-                ", ".join(by_name(s["sensor_noise_stds"])),
+                by_name(s["sensor_noise_stds"], width=24),
                 f"{s['em_iterations']}" + ("" if s["em_converged"] else ", not converged"),
                 *([", ".join(s["not_scaled"])] if scaling else []),
             ]

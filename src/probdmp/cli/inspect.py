@@ -83,7 +83,7 @@ def _print_document(document: dict[str, Any]) -> None:
                 str(p["demonstrations"]),
                 f"{p['duration']:.3f}",
                 f"{p['dt']:.4g}",
-                *("\n".join(by_name(p[key])) for key in ("start", "goal", "sensor_noise_stds")),
+                *(by_name(p[key]) for key in ("start", "goal", "sensor_noise_stds")),
             ]
             for p in primitives
         ],

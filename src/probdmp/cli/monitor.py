@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from probdmp.cli.exit_codes import FAILURE_DETECTED, UsageError
+from probdmp.cli.exit_codes import FAILURE_DETECTED, UsageError, usage
 from probdmp.cli.options import Duration, Goal, Json, Label, ModelFile, Start, StartVelocity, TaskOptions
 from probdmp.cli.output import print_json, print_line
 from probdmp.cli.recordings import primitive_of, read_executions
@@ -56,7 +56,9 @@ def monitor(
 
     Out: time, position, velocity, acceleration, log_likelihood (nats), test_ratio (above 1: alarm), failed.
     """
+    from probdmp.checks import check_choice, check_positive
     from probdmp.estimator import PrimitiveLibrary, load_detector
+    from probdmp.execution.online import ALARM_REACTIONS
 
     library, detector = PrimitiveLibrary.load(model), load_detector(model)
     if detector is None:
@@ -64,7 +66,10 @@ def monitor(
         raise ModelFileError(f"a failure detector in {str(model)!r}", "a model without one", hint)
     task = TaskOptions(start, goal, duration, start_velocity)
     if execution == "-":
-        failed = monitor_stream(library, detector, StreamOptions(label, task, dt, on_alarm or "continue"))
+        with usage():
+            dt = None if dt is None else check_positive(dt, "--dt", "seconds")
+            on_alarm = check_choice(on_alarm or "continue", "--on-alarm", ALARM_REACTIONS)
+        failed = monitor_stream(library, detector, StreamOptions(label, task, dt, on_alarm))
     elif dt is not None or on_alarm is not None:
         raise UsageError("--dt and --on-alarm with JSON lines only", f"them with {execution!r}", "A file has its own dt.")
     else:

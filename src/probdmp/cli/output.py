@@ -58,6 +58,7 @@ def print_table(columns: Sequence[str], rows: Iterable[Sequence[str]], title: st
         title=Text(printable(title)) if title else None,
         title_justify="left",
         box=box.SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
         pad_edge=False,
         title_style="bold",
     )

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, BinaryIO, NoReturn
 
-from probdmp.cli.exit_codes import UsageError, usage
+from probdmp.cli.exit_codes import UsageError
 from probdmp.cli.options import TaskOptions
 from probdmp.cli.output import json_line
 from probdmp.cli.recordings import choose_primitive
@@ -84,11 +84,10 @@ def _prepare(
             raise InputError(error.expected, error.got) from error
         raise
     arguments = options.task.arguments(learned.primitive_)
-    with usage():
-        arguments["dt"] = None if options.dt is None else check_positive(options.dt, "--dt", "seconds")
-    arguments |= {key: value for key, value in asked.items() if key != "label" and value is not None}
-    task_for(learned.primitive_, **{key: value for key, value in arguments.items() if key != "dt"})
-    return learned, arguments
+    arguments |= {key: value for key, value in asked.items() if key not in ("label", "dt") and value is not None}
+    task_for(learned.primitive_, **arguments)
+    dt = asked.get("dt", options.dt)
+    return learned, {**arguments, "dt": None if dt is None else check_positive(dt, "dt", "seconds")}
 
 
 def _begin(

@@ -35,9 +35,11 @@ def not_scaled(primitive: "Primitive") -> list[str]:
     return [name for name, scaled in zip(primitive.names, primitive.scaled, strict=True) if not scaled]
 
 
-def by_name(values: Mapping[str, float]) -> list[str]:
-    """Numbers with the names they belong to, such as `x 1.25`."""
-    return [f"{name} {value:.3g}" for name, value in values.items()]
+def by_name(values: Mapping[str, float], width: int = 0) -> str:
+    """Numbers with the names they belong to: `x 1.25, y 0.3` if that fits into the width, else one per line."""
+    texts = [f"{name} {value:.3g}" for name, value in values.items()]
+    line = ", ".join(texts)
+    return line if len(line) <= width else "\n".join(texts)
 
 
 def common_units(summaries: Sequence[Mapping[str, Any]]) -> str:

@@ -1,0 +1,111 @@
+"""`probdmp evaluate` and `probdmp demo`."""
+
+import json
+import sys
+
+import pytest
+
+from probdmp.cli.evaluation_table import print_evaluation
+from probdmp.demonstrations import FAULTS, synthetic_letters
+from probdmp.dmp import Configuration
+from probdmp.evaluation import READINGS, Evaluation, Experiment, Outcome
+from probdmp.evaluation import evaluate as evaluate_directly
+from probdmp.evaluation.experiment import DETECTORS, TASKS
+
+SMALL = ("--train", 3, "--test", 3)
+
+
+def as_json(evaluation):
+    return json.loads(json.dumps(evaluation.as_dict()))
+
+
+def test_the_document_is_that_of_the_evaluation(folder, run_json, letters):
+    document = run_json("evaluate", folder / "letters.npz", *SMALL, "--seed", 5, "--task", "nominal")
+    assert document == as_json(evaluate_directly(letters, Experiment(3, 3, 5, task="nominal")))
+    assert (document["classes"], document["seed"], document["task"]) == (2, 5, "nominal")
+
+
+def test_the_librarys_own_configuration(folder, run_json, letters):
+    document = run_json("evaluate", folder / "letters.npz", *SMALL, "--configuration", "default")
+    assert document == as_json(evaluate_directly(letters, Experiment(3, 3, configuration=Configuration())))
+
+
+def test_the_table_has_the_papers_figures_and_every_reading(folder, run):
+    result = run("evaluate", folder / "letters.npz", *SMALL, env={"COLUMNS": "80"})
+    assert (result.exit_code, result.stderr) == (0, "")
+    for words in ("2/220 0.9 %", "220/220 100.0 %", "98.3–100.0 %", "detected", "ever failed", "latency", "Fault: hold"):
+        assert words in result.stdout
+    for reading in READINGS:
+        assert reading.likelihood.replace("_", " ") in result.stdout
+    table = [line for line in result.stdout.splitlines() if "/220" in line or "/6 " in line]
+    assert len(table) == 1 + len(READINGS)
+
+
+def test_the_table_fits_into_eighty_columns(monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "80")
+    outcomes = [Outcome("a", 1.0, 0.9, {"hold": 0.5}, {"hold": 0.99})] * 998 + [
+        Outcome("b", 1.0, None, {"hold": 0.5}, {"hold": None})
+    ]
+    print_evaluation(Evaluation(Experiment(), dict.fromkeys(READINGS, outcomes)))
+    table, _, _ = capsys.readouterr().out.partition("Second lines")
+    assert table.count("998/999 99.9 %") == 3 * len(READINGS)
+    assert max(map(len, table.splitlines())) <= 80
+
+
+def test_too_few_demonstrations_are_a_usage_error_that_names_the_classes(folder, run):
+    result = run("evaluate", folder / "letters.npz")
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert "--train + --test = 20" in result.stderr
+    assert "6 of 'c', 6 of 'l'" in result.stderr
+    assert "--train 3 --test 3" in result.stderr
+
+
+@pytest.mark.parametrize(
+    "option",
+    [("--task", "x"), ("--detector", "x"), ("--fault", "x"), ("--fault", ""), ("--configuration", "x"), ("--train", 0)],
+)
+def test_unknown_choices_are_usage_errors(option, folder, run):
+    assert run("evaluate", folder / "letters.npz", *option).exit_code == 2
+
+
+def test_help_names_every_choice(run):
+    shown = run("evaluate", "--help").stdout
+    for choice in (*DETECTORS, *TASKS, *FAULTS):
+        assert choice in shown
+
+
+DEMO = ("demo", "--letters", "l", "--train", 2, "--test", 2)
+
+
+def test_demo_writes_a_report(run, tmp_path):
+    report = tmp_path / "r.html"
+    result = run(*DEMO, "-o", report)
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert f"Report: {report}" in result.stdout
+    page = report.read_text()
+    assert "<svg" in page
+    assert "probdmp demo --letters l --train 2 --test 2 --seed 0" in page
+
+
+def test_demo_without_matplotlib_says_what_to_install(run, monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    result = run(*DEMO, "-o", tmp_path / "r.html")
+    assert result.exit_code == 0
+    assert "2/220 0.9 %" in result.stdout
+    assert "Report" not in result.stdout
+    assert "pip install 'probdmp[plot]'" in result.stderr
+    assert not (tmp_path / "r.html").exists()
+
+
+def test_demo_prints_the_document_of_the_evaluation(run, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    result = run(*DEMO, "--seed", 3, "-o", tmp_path / "r.html", "--json")
+    experiment = Experiment(2, 2, seed=3)
+    expected = evaluate_directly(synthetic_letters(4, 3, "l"), experiment)
+    assert result.stdout == json.dumps(expected.as_dict(), allow_nan=False) + "\n"
+
+
+def test_demo_refuses_before_it_works(run, tmp_path):
+    assert run("demo", "--letters", "aa").exit_code == 2
+    assert run("demo", "-o", tmp_path / "none" / "r.html").exit_code == 2
+    assert run("demo", "-o", tmp_path / "r.txt").exit_code == 2
