@@ -2,6 +2,8 @@
 
     ProbDMPError
     ├── InputError (ValueError)          a value that cannot be used: shape, range, NaN, times
+    │   ├── UnknownLabelError (KeyError)   no primitive has this label
+    │   └── TooFewDemonstrationsError      an experiment asks for more than there are
     ├── InputTypeError (TypeError)       the wrong kind of thing: strings, objects, complex numbers
     ├── NotFittedError (AttributeError)  a model that has not been learned yet
     ├── DataFileError (ValueError)       a demonstration file that is damaged, hostile or not what it claims
@@ -21,6 +23,8 @@ __all__ = [
     "ModelFileError",
     "NotFittedError",
     "ProbDMPError",
+    "TooFewDemonstrationsError",
+    "UnknownLabelError",
 ]
 
 
@@ -40,12 +44,23 @@ class ProbDMPError(Exception):
         self.got = got
         self.hint = hint
 
+    def __str__(self) -> str:
+        return str(self.args[0])
+
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.expected, self.got, self.hint)
 
 
 class InputError(ProbDMPError, ValueError):
     """A value that cannot be used."""
+
+
+class UnknownLabelError(InputError, KeyError):
+    """No primitive has this label."""
+
+
+class TooFewDemonstrationsError(InputError):
+    """An experiment asks for more demonstrations than there are."""
 
 
 class InputTypeError(ProbDMPError, TypeError):

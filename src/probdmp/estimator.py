@@ -12,7 +12,7 @@ from probdmp.demonstrations import Demonstration, as_demonstrations
 from probdmp.demonstrations.demonstration import MILLISECONDS_HINT
 from probdmp.detection import FailureDetector
 from probdmp.dmp import PUBLISHED, Configuration, Primitive, Task, task_for
-from probdmp.errors import InputError, ModelFileError, NotFittedError
+from probdmp.errors import InputError, ModelFileError, NotFittedError, UnknownLabelError
 from probdmp.execution import (
     GaussianTrajectory,
     OnlineExecution,
@@ -271,7 +271,7 @@ class PrimitiveLibrary(Mapping[str, ProbabilisticDMP]):
 
     def __getitem__(self, label: str) -> ProbabilisticDMP:
         if label not in self._primitives:
-            raise InputError(f"a label of the library, one of {sorted(self)}", repr(label))
+            raise UnknownLabelError(f"a label of the library, one of {sorted(self)}", repr(label))
         return self._primitives[label]
 
     def __iter__(self) -> Iterator[str]:
@@ -300,7 +300,7 @@ def load(path: str | Path, label: str | None = None) -> ProbabilisticDMP:
     labels = list(contents.primitives)
     chosen = labels[0] if label is None and len(labels) == 1 else label
     if chosen not in contents.primitives:
-        raise InputError(f"a label of the file, one of {sorted(labels)}", repr(label))
+        raise UnknownLabelError(f"a label of the file, one of {sorted(labels)}", repr(label))
     return _restored(contents, str(chosen))
 
 

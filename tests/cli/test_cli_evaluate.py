@@ -55,9 +55,9 @@ def test_the_table_fits_into_eighty_columns(monkeypatch, capsys):
 def test_too_few_demonstrations_are_a_usage_error_that_names_the_classes(folder, run):
     result = run("evaluate", folder / "letters.npz")
     assert (result.exit_code, result.stdout) == (2, "")
-    assert "--train + --test = 20" in result.stderr
+    assert "train + test = 20" in result.stderr
     assert "6 of 'c', 6 of 'l'" in result.stderr
-    assert "--train 3 --test 3" in result.stderr
+    assert "train = 3, test = 3" in result.stderr
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from probdmp.cli.evaluation_table import print_evaluation
-from probdmp.cli.exit_codes import UsageError, usage
+from probdmp.cli.exit_codes import usage
 from probdmp.cli.options import Columns, Json, Seed, names_of
 from probdmp.cli.output import print_json
 from probdmp.cli.progress import progress
@@ -62,21 +62,8 @@ def evaluate(
 
 
 def evaluation_of(demonstrations: Sequence["Demonstration"], experiment: "Experiment") -> "Evaluation":
-    """Run an experiment with a progress bar.
-
-    Raises
-    ------
-    UsageError
-        If a class has too few demonstrations for the split that was asked for.
-    """
+    """Run an experiment with a progress bar."""
     from probdmp.evaluation import evaluate
-    from probdmp.evaluation.experiment import group_by_label
 
-    counts = {label: len(members) for label, members in group_by_label(demonstrations).items()}
-    needed, least = experiment.train + experiment.test, min(counts.values())
-    if least < needed:
-        scarce = ", ".join(f"{n} of {label!r}" for label, n in counts.items() if n < needed)
-        hint = f"Ask for fewer: --train {least // 2} --test {least - least // 2}." if least > 1 else "Leave out such classes."
-        raise UsageError(f"--train + --test = {needed} demonstrations of every class", scarce, hint)
-    with progress("Evaluating", len(counts)) as done:
+    with progress("Evaluating", len({demonstration.label for demonstration in demonstrations})) as done:
         return evaluate(demonstrations, experiment, done)

@@ -5,7 +5,14 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from probdmp.errors import DataFileError, InputError, InputTypeError, ModelFileError, ProbDMPError
+from probdmp.errors import (
+    DataFileError,
+    InputError,
+    InputTypeError,
+    ModelFileError,
+    ProbDMPError,
+    TooFewDemonstrationsError,
+)
 
 __all__ = ["FAILURE_DETECTED", "UsageError", "exit_code", "message", "stop_writing", "usage"]
 
@@ -23,6 +30,7 @@ class UsageError(ProbDMPError):
 
 EXIT_CODES: dict[type[BaseException], int] = {
     UsageError: USAGE,
+    TooFewDemonstrationsError: USAGE,
     DataFileError: BAD_INPUT,
     ModelFileError: BAD_INPUT,
     InputError: BAD_INPUT,

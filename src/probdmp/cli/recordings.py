@@ -75,7 +75,7 @@ def choose_primitive(library: "PrimitiveLibrary", label: str | None) -> tuple[st
     """
     alone = next(iter(library)) if len(library) == 1 else None
     chosen = alone if label is None or alone == "" else label
-    if chosen is None or chosen not in list(library):
+    if chosen is None or chosen not in list(library):  # a label from a stream may be of any kind
         labels = ", ".join(map(repr, library))
         raise UsageError(f"--label to be one of those in the model: {labels}", "none" if label is None else repr(label))
     return chosen, library[chosen]

@@ -15,7 +15,7 @@ from probdmp.checks import check_choice, check_count
 from probdmp.demonstrations import FAULTS, Demonstration
 from probdmp.detection import FailureDetector, Verdict
 from probdmp.dmp import PUBLISHED, Configuration, Primitive, Task, task_for
-from probdmp.errors import InputError
+from probdmp.errors import TooFewDemonstrationsError
 from probdmp.evaluation.outcomes import READINGS, Outcome, Reading, Summary, published_summary, summarize
 from probdmp.learning import LearningOptions, fit_primitive
 
@@ -102,7 +102,7 @@ def evaluate(
 
     Raises
     ------
-    InputError
+    TooFewDemonstrationsError
         If a class has too few demonstrations; all such classes are named.
     """
     classes = _classes(demonstrations, experiment.train + experiment.test)
@@ -181,10 +181,11 @@ def _classes(demonstrations: Sequence[Demonstration], needed: int) -> dict[str, 
     classes = group_by_label(demonstrations)
     scarce = {label: len(members) for label, members in classes.items() if len(members) < needed}
     if scarce:
-        raise InputError(
-            f"at least {needed} demonstrations of every class, training and test together",
+        least = min(scarce.values())
+        raise TooFewDemonstrationsError(
+            f"at least train + test = {needed} demonstrations of every class",
             ", ".join(f"{n} of {label!r}" for label, n in scarce.items()),
-            "Ask for fewer, such as --train 5 --test 5.",
+            f"Ask for fewer: train = {least // 2}, test = {least - least // 2}." if least > 1 else "Leave out such classes.",
         )
     return classes
 
