@@ -100,10 +100,7 @@ def frozen(array: FloatArray) -> FloatArray:
 def check_positive(value: object, name: str, unit: str = "", hint: str = "") -> float:
     """A finite number > 0."""
     wanted = f"{name} > 0" + (f" in {unit}" if unit else "")
-    array = np.asarray(value)
-    if array.ndim != 0 or array.dtype.kind not in "fiu":
-        raise InputTypeError(f"{wanted}, one number", repr(value), hint)
-    number = float(array)
+    number = _number(value, f"{wanted}, one number", hint)
     if not 0 < number <= LARGEST_MAGNITUDE:
         raise InputError(wanted, repr(value), hint)
     return number
@@ -111,12 +108,19 @@ def check_positive(value: object, name: str, unit: str = "", hint: str = "") -> 
 
 def check_fraction(value: object, name: str, most: float = 1.0) -> float:
     """A number from 0 to `most`."""
-    array = np.asarray(value)
-    if array.ndim != 0 or array.dtype.kind not in "fiu":
-        raise InputTypeError(f"{name} as one number from 0 to {most:g}", repr(value))
-    if not 0 <= float(array) <= most:
+    number = _number(value, f"{name} as one number from 0 to {most:g}", "")
+    if not 0 <= number <= most:
         raise InputError(f"{name} as a number from 0 to {most:g}", repr(value))
-    return float(array)
+    return number
+
+
+def _number(value: object, wanted: str, hint: str) -> float:
+    """One real number, of Python or NumPy."""
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating | np.ndarray):
+        raise InputTypeError(wanted, f"{value!r:.100}", hint)
+    if isinstance(value, np.ndarray) and (value.ndim != 0 or value.dtype.kind not in "fiu"):
+        raise InputTypeError(wanted, f"{value!r:.100}", hint)
+    return float(min(value, 2 * LARGEST_MAGNITUDE))
 
 
 def check_count(value: object, name: str, least: int = 1, most: int | None = None, hint: str = "") -> int:

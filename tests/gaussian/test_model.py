@@ -1,15 +1,15 @@
 """The system as a value: its shapes, its derived arrays, and what it refuses to be given."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from reference import system_at
-from strategies import batch_indices, random_system, systems
+from strategies import batch_indices, draw_observations, random_system, systems
 
 from probdmp.errors import InputError, InputTypeError
-from probdmp.gaussian import LinearGaussianModel, filter_sequence, smooth_sequence
+from probdmp.gaussian import LinearGaussianModel, filter_sequence, sample_sequences, smooth_sequence
 
 
 @pytest.fixture
@@ -43,6 +43,47 @@ def test_batch_axes_broadcast():
         initial_covariance=np.zeros((3, 3)),
     )
     assert model.batch_shape == (4, 2)
+
+
+TIMED = ("inputs", "input_covariances")
+FIELDS = [field.name for field in fields(LinearGaussianModel)]
+
+
+def batched(model, name, copies=2):
+    """The same system several times, with batch axes on one array only."""
+    return replace(model, **{name: np.stack([getattr(model, name)] * copies, axis=name in TIMED)})
+
+
+@pytest.mark.parametrize("name", FIELDS)
+def test_any_one_array_may_carry_the_batch(name):
+    rng = np.random.default_rng(0)
+    alone = random_system(rng, n_states=3, n_inputs=2, n_sensors=2, n_steps=6)
+    observations = draw_observations(alone, rng, missing=0.2)
+    model = batched(alone, name)
+    assert model.batch_shape == (2,)
+    for run in (lambda m, o: filter_sequence(m, o).filtered, smooth_sequence):
+        expected, result = run(alone, observations), run(model, np.stack([observations] * 2, axis=1))
+        for d in range(2):
+            np.testing.assert_allclose(result.means[:, d], expected.means, rtol=1e-12, atol=1e-12)
+            np.testing.assert_allclose(result.covariances[:, d], expected.covariances, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", FIELDS)
+def test_any_one_array_may_carry_the_batch_of_draws(name):
+    rng = np.random.default_rng(0)
+    alone = random_system(rng, n_states=3, n_inputs=2, n_sensors=2, n_steps=6)
+    states, observations = sample_sequences(batched(alone, name), 3, rng)
+    assert states.shape == (3, 6, 2, 3)
+    assert observations.shape == (3, 6, 2, 2)
+
+
+def test_batch_is_not_mistaken_for_time():
+    alone = random_system(np.random.default_rng(0), n_states=1, n_inputs=1, n_sensors=1, n_steps=3, known_start=True)
+    alone = replace(alone, input_covariances=np.array([[[0.0]], [[1.0]]]))
+    states, _ = sample_sequences(batched(alone, "transition"), 100, np.random.default_rng(0))
+    spread = states[..., 0].std(axis=0)
+    assert np.all(spread[:2] < 1e-12)
+    assert np.all(spread[2] > 0)
 
 
 @given(systems())
@@ -90,6 +131,6 @@ def test_other_than_real_numbers_are_refused(model, observations):
 def test_observation_covariance_that_is_not_positive_definite_is_refused(model, run, covariance):
     bad = replace(model, observation_covariance=np.asarray(covariance))
     with pytest.raises(
-        InputError, match=r"observation_covariance positive definite, got an eigenvalue <= 0.*variance above zero"
+        InputError, match=r"observation_covariance symmetric and positive definite, got one that is not.*variance above zero"
     ):
         run(bad, np.zeros((5, 2, 2)))

@@ -121,5 +121,7 @@ def test_a_slower_movement_has_the_same_forcing(scheme):
     for d in (demo, slow):
         path = smooth_path(d, 0.05)
         velocities = scheme_velocities(path, d.dt, scheme)
-        targets.append(forcing_targets(path.positions, velocities, path.positions[-1], d.dt, Configuration(discretization=scheme)))
+        targets.append(
+            forcing_targets(path.positions, velocities, path.positions[-1], d.dt, Configuration(discretization=scheme))
+        )
     np.testing.assert_allclose(targets[0], targets[1], atol=1e-9 * np.abs(targets[0]).max())

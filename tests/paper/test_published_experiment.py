@@ -158,14 +158,14 @@ def check_blocked_fail_more_often(reading, only_blocked, only_undisturbed):
 @pytest.mark.parametrize("configuration", CONFIGURATIONS)
 def test_the_protocol_on_a_few_letters(configuration):
     """Blocked executions are called failed far more often than undisturbed ones, step by step."""
-    demonstrations = synthetic_letters(20, letters="alvz")
-    check_laws(demonstrations, Experiment(configuration=CONFIGURATIONS[configuration]), 4)
+    demonstrations = synthetic_letters(20, letters="alv")
+    check_laws(demonstrations, Experiment(configuration=CONFIGURATIONS[configuration]), 3)
 
 
 def test_the_experiment_can_be_repeated():
     """The same seed gives the same split, onsets and outcomes; a letter's do not depend on which others are there."""
-    both = synthetic_letters(12, letters="lv")
-    experiment = Experiment(train=8, test=4)
+    both = synthetic_letters(6, letters="lv")
+    experiment = Experiment(train=4, test=2)
     first, again = (evaluate(both, experiment).as_dict() for _ in range(2))
     assert first == again
     alone = evaluate([d for d in both if d.label == "v"], experiment).as_dict()
@@ -175,7 +175,7 @@ def test_the_experiment_can_be_repeated():
 def test_too_few_demonstrations_are_named():
     """The protocol needs its demonstrations: which classes have too few is said."""
     letters = [*synthetic_letters(20, letters="l"), *synthetic_letters(7, letters="v")]
-    with pytest.raises(InputError, match=r"at least 20 demonstrations of every class.*7 of 'v'.*--train 5 --test 5"):
+    with pytest.raises(InputError, match=r"20 demonstrations of every class.*7 of 'v'"):
         evaluate(letters, Experiment())
 
 

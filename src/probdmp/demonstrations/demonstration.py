@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -54,11 +55,16 @@ class Demonstration:
             )
         if n_dof < 1:
             raise InputError("positions with at least one degree of freedom", shape_text(positions.shape), hint)
+        if not all(isinstance(given, kind) for given, kind in ((self.names, tuple | list), (self.channels, Mapping))):
+            raise InputTypeError("names in a tuple and channels by name", f"{self.names!r:.100} and {self.channels!r:.100}")
+        if not all(isinstance(text, str) for text in (self.label, self.units, *self.names, *self.channels)):
+            raise InputTypeError(
+                "names, label, units and channel names as text",
+                f"{(self.label, self.units, *self.names, *self.channels)!r:.200}",
+            )
         names = tuple(self.names) or tuple(f"dof{i}" for i in range(n_dof))
-        if len(names) != n_dof or len(set(names)) != n_dof or not all(isinstance(name, str) for name in names):
+        if len(names) != n_dof or len(set(names)) != n_dof:
             raise InputError(f"{n_dof} different names, one per column", repr(names))
-        if not all(isinstance(text, str) for text in (self.label, self.units, *self.channels)):
-            raise InputTypeError("label, units and channel names as text", f"{(self.label, self.units, *self.channels)!r}")
         if not set(names).isdisjoint(self.channels):
             raise InputError("channels named otherwise than the degrees of freedom", repr(sorted(self.channels)))
         channels = {
@@ -69,6 +75,10 @@ class Demonstration:
         object.__setattr__(self, "dt", check_positive(self.dt, "dt", "seconds", MILLISECONDS_HINT))
         object.__setattr__(self, "names", names)
         object.__setattr__(self, "channels", MappingProxyType(channels))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        channels = dict(self.channels)  # the read-only view of them cannot be copied or sent elsewhere
+        return type(self), (self.positions, self.dt, self.label, self.names, self.units, channels)
 
     def __repr__(self) -> str:
         label = f" {self.label!r}" if self.label else ""

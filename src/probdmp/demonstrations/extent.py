@@ -27,9 +27,9 @@ def mean_ranges(demonstrations: Sequence[Demonstration]) -> FloatArray:
         If a range is so small or large that its square would not be finite.
     """
     extents = np.mean([np.nanmax(d.positions, axis=0) - np.nanmin(d.positions, axis=0) for d in demonstrations], axis=0)
-    magnitude = float(np.nanmax([np.nanmax(np.abs(d.positions)) for d in demonstrations]))
-    still = extents <= STILL * magnitude
-    ranges = np.where(still, (magnitude or 1.0) if still.all() else extents.max(), extents)
+    magnitudes = np.max([np.nanmax(np.abs(d.positions), axis=0) for d in demonstrations], axis=0)
+    still = extents <= STILL * magnitudes
+    ranges = np.where(still, (magnitudes.max() or 1.0) if still.all() else extents.max(), extents)
     if not RANGES[0] <= ranges.min() <= ranges.max() <= RANGES[1]:
         got = f"from {ranges.min():g} to {ranges.max():g}"
         raise InputError(f"movement over {RANGES[0]:g} to {RANGES[1]:g} units", got, "Rescale the data, to metres say.")

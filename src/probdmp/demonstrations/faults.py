@@ -28,11 +28,13 @@ def hold(positions: FloatArray, onset: int, rng: np.random.Generator) -> FloatAr
 
     Returns
     -------
-    (T, D) array: as recorded before the onset, the last free position with sensor noise from then on.
+    (T, D) array: as recorded before the onset, the last position measured, with sensor noise, from then on.
     """
     held = np.array(positions)
     noise = rng.standard_normal(held[onset:].shape) * noise_stds(positions)
-    held[onset:] = held[onset - 1] + noise
+    for d, column in enumerate(positions[:onset].T):
+        seen = column[~np.isnan(column)]
+        held[onset:, d] = (seen[-1] if len(seen) else np.nan) + noise[:, d]
     return held
 
 

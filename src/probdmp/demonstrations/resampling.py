@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from probdmp.checks import check_array, check_positive
+from probdmp.checks import check_array, check_positive, shape_text
 from probdmp.demonstrations.demonstration import LONGEST_RECORDING, MILLISECONDS_HINT, Demonstration
 from probdmp.errors import InputError
 
@@ -35,6 +35,8 @@ def demonstration_from_times(
     times = check_array(times, "times", (len(positions),), hint="One time per row of positions.")
     if len(times) < 2:
         raise InputError("at least two samples", str(len(times)))
+    if positions.shape[1] < 1:
+        raise InputError("positions with at least one degree of freedom", shape_text(positions.shape))
     steps = np.diff(times)
     if np.any(steps <= 0):
         first = int(np.argmax(steps <= 0))

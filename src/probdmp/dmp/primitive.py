@@ -169,7 +169,7 @@ def task_for(
 
 
 def _check_semidefinite(covariances: FloatArray, name: str) -> None:
-    asymmetry = np.max(np.abs(covariances - covariances.mT), initial=0.0)
-    largest = np.max(np.abs(covariances), initial=0.0)
-    if asymmetry > 1e-9 * largest or np.min(np.linalg.eigvalsh(covariances), initial=0.0) < -1e-9 * largest:
+    slack = 1e-9 * np.max(np.abs(covariances), axis=(-2, -1), initial=0.0)
+    asymmetry = np.max(np.abs(covariances - covariances.mT), axis=(-2, -1), initial=0.0)
+    if np.any(asymmetry > slack) or np.any(np.linalg.eigvalsh(covariances)[:, 0] < -slack):
         raise InputError(f"{name} symmetric and positive semi-definite", "one that is not", "Was it edited by hand?")

@@ -132,13 +132,10 @@ def filter_sequence(model: LinearGaussianModel, observations: FloatArray | None 
     Raises
     ------
     InputError
-        If the shape of `observations` does not fit the model, or R is not positive definite.
+        If the model is not finite, R not positive definite, or the shape of `observations` does not fit.
     """
-    batch, n_sensors, n_states = model.batch_shape, *model.observation_matrix.shape[-2:]
-    if observations is None:
-        observed = np.full((model.n_steps, *batch, n_sensors), np.nan)
-    else:
-        observed = model.check_observations(observations)
+    model.check()
+    observed, batch, n_states = model.check_observations(observations), model.batch_shape, model.transition.shape[-1]
     drifts, process_covariances = model.drifts(), model.process_covariances()
     mean = np.broadcast_to(model.initial_mean, (*batch, n_states))
     covariance = np.broadcast_to(model.initial_covariance, (*batch, n_states, n_states))

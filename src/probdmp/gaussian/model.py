@@ -12,7 +12,7 @@ Every array may carry leading batch axes, written `*batch`: independent systems 
 the degrees of freedom of a robot or the executions of a data set. Time comes first in whatever depends on time.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
@@ -75,34 +75,49 @@ class LinearGaussianModel:
             self.initial_covariance.shape[:-2],
         )
 
+    def timed_inputs(self) -> tuple[FloatArray, FloatArray]:
+        """u and U with all batch axes, of length 1 where they have none: (T-1, *batch, m) and (T-1, *batch, m, m)."""
+        n_batch = len(self.batch_shape)
+
+        def spread(array: FloatArray, n_core: int) -> FloatArray:
+            missing = n_batch + 1 + n_core - array.ndim
+            return array.reshape(len(array), *(1,) * missing, *array.shape[1:])
+
+        return spread(self.inputs, 1), spread(self.input_covariances, 2)
+
     def drifts(self) -> FloatArray:
         """B u[t] for every transition, (T-1, *batch, n)."""
-        return np.matmul(self.input_matrix, self.inputs[..., None])[..., 0]
+        return np.matmul(self.input_matrix, self.timed_inputs()[0][..., None])[..., 0]
 
     def process_covariances(self) -> FloatArray:
         """Q[t] = B U[t] B^T for every transition, (T-1, *batch, n, n)."""
         b = self.input_matrix
-        return b @ self.input_covariances @ b.mT
+        return b @ self.timed_inputs()[1] @ b.mT
 
-    def check_observations(self, observations: FloatArray) -> FloatArray:
-        """Observations as a (T, *batch, O) array in which NaN marks what was not seen."""
-        n_sensors = self.observation_matrix.shape[-2]
-        shape = (self.n_steps, *self.batch_shape, n_sensors)
-        array = check_array(
-            observations,
-            "observations",
-            shape,
-            missing=True,
-            hint=f"T = {self.n_steps} times first, then the batch, then {n_sensors} sensors.",
-        )
-        self.check_sensors()
-        return array
+    def check(self) -> None:
+        """Refuse what the filter could only turn into NaN: it divides by R, which must be positive definite.
 
-    def check_sensors(self) -> None:
-        """Refuse an observation covariance that is not positive definite: the filter divides by it."""
-        if np.any(np.linalg.eigvalsh(self.observation_covariance) <= 0):
+        Raises
+        ------
+        InputError
+            If a number is not finite, or R is not symmetric and positive definite.
+        """
+        for field in fields(self):
+            if not np.isfinite(getattr(self, field.name)).all():
+                raise InputError(f"{field.name} finite", "NaN or infinity in it")
+        r = self.observation_covariance
+        if np.any(r != r.mT) or np.any(np.linalg.eigvalsh(r) <= 0):
             raise InputError(
-                "observation_covariance positive definite",
-                "an eigenvalue <= 0",
+                "observation_covariance symmetric and positive definite",
+                "one that is not",
                 "Give every sensor a variance above zero, if only a tiny one.",
             )
+
+    def check_observations(self, observations: FloatArray | None) -> FloatArray:
+        """Observations as a (T, *batch, O) array in which NaN marks what was not seen; nothing was without any."""
+        n_sensors = self.observation_matrix.shape[-2]
+        shape = (self.n_steps, *self.batch_shape, n_sensors)
+        if observations is None:
+            return np.full(shape, np.nan)
+        hint = f"T = {self.n_steps} times first, then the batch, then {n_sensors} sensors."
+        return check_array(observations, "observations", shape, missing=True, hint=hint)

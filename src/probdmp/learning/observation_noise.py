@@ -57,7 +57,7 @@ def estimate_observation_noise(
     likelihoods = [_filter(model, observations, r)[1].log_likelihoods.sum(axis=(0, 1)) for r in candidates]
     variances = np.take_along_axis(candidates, np.argmax(likelihoods, axis=0)[None], axis=0)[0]
     best, safe, length = np.max(likelihoods, axis=0), variances, np.ones_like(variances)
-    history: list[float] = []
+    settled, history = np.zeros(len(variances), dtype=bool), list[float]()
     for _ in range(max_iterations):
         current, forward = _filter(model, observations, variances)
         reached = forward.log_likelihoods.sum(axis=(0, 1))
@@ -69,8 +69,10 @@ def estimate_observation_noise(
         best = reached
         history.append(float(reached.sum()))
         safe = np.maximum(maximize_observation_noise(current, observations, forward), floor)
-        if np.all(np.abs(safe - variances) <= tolerance * variances):
-            return ObservationNoise(safe, np.array(history), True)
+        settled |= np.abs(safe - variances) <= tolerance * variances
+        if settled.all():
+            return ObservationNoise(variances, np.array(history), True)
+        safe = np.where(settled, variances, safe)  # what has settled does not move while the others do
         variances = np.maximum(variances * (safe / variances) ** length, floor)
         length = length * STEP_GROWTH
     return ObservationNoise(safe, np.array(history), False)

@@ -50,9 +50,9 @@ def regress_weights(features: FloatArray, targets: FloatArray, resolution: float
     eigenvalues, vectors = np.linalg.eigh(features.T @ features)
     eigenvalues = np.maximum(eigenvalues, 0.0)
     projected = vectors.T @ (features.T @ targets)
-    energy = float(targets @ targets)
+    energy, n = float(targets @ targets), len(targets)
     # Bounds, for targets that are nothing but noise, or not noisy at all.
-    scale = float(eigenvalues.max()) / len(targets) / size
+    scale = float(eigenvalues.max()) / n / size
     largest_beta = LARGEST_RATIO / size
     alpha, beta = scale, 10 / size
     for _ in range(MOST_ITERATIONS):
@@ -62,7 +62,9 @@ def regress_weights(features: FloatArray, targets: FloatArray, resolution: float
         residual = energy - 2 * float(weights @ projected) + float(eigenvalues @ weights**2)
         before = np.array([alpha, beta])
         alpha = gamma / max(float(weights @ weights), gamma / (scale * LARGEST_RATIO))
-        beta = (len(targets) - gamma) / max(residual, (len(targets) - gamma) / largest_beta)
+        # n - gamma, without the cancellation where there are fewer targets than weights
+        free = float(np.sum(alpha / (alpha + beta * eigenvalues[-n:]))) + max(n - len(eigenvalues), 0)
+        beta = free / max(residual, free / largest_beta)
         if np.all(np.abs(np.log(before / [alpha, beta])) < TOLERANCE):
             break
     covariance = (vectors / (alpha + beta * eigenvalues)) @ vectors.T

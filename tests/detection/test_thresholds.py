@@ -1,0 +1,50 @@
+"""The paper's rule in a form that survives a change of sign."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from probdmp.detection.thresholds import PaperThreshold
+
+numbers = st.floats(-1e6, 1e6)
+
+
+@given(st.floats(-1e6, -1e-6), numbers)
+def test_below_zero_it_is_twice_the_minimum(minimum, statistic):
+    threshold = PaperThreshold(minimum)
+    assert threshold.level == 2 * minimum
+    assert (threshold.test_ratio(statistic) > 1) == (minimum - statistic > -minimum)
+
+
+@given(numbers, numbers)
+def test_an_alarm_is_a_statistic_below_the_level(minimum, statistic):
+    threshold, scale = PaperThreshold(minimum), max(abs(minimum), abs(statistic), 1.0)
+    if abs(statistic - threshold.level) > 1e-9 * scale:
+        assert (threshold.test_ratio(statistic) > 1) == (statistic < threshold.level)
+
+
+@given(numbers, st.floats(0, 1e6))
+def test_what_was_seen_in_training_is_never_an_alarm(minimum, above):
+    """Twice a positive minimum would lie above it, and everything would be called failed."""
+    assert PaperThreshold(minimum).test_ratio(minimum + above) == 0
+    assert PaperThreshold(minimum).level <= minimum
+
+
+@given(numbers, numbers, numbers)
+def test_less_likely_is_never_less_suspicious(minimum, one, other):
+    threshold = PaperThreshold(minimum)
+    assert threshold.test_ratio(min(one, other)) >= threshold.test_ratio(max(one, other)) >= 0
+
+
+@pytest.mark.parametrize("minimum", [-7.0, 0.0, 7.0])
+def test_examples(minimum):
+    threshold = PaperThreshold(minimum)
+    assert threshold.test_ratio(minimum - 0.5 * abs(minimum)) == pytest.approx(0.5 if minimum else 0.0)
+    assert threshold.test_ratio(minimum - 3 * abs(minimum) - 1e-6) > 1
+
+
+@pytest.mark.parametrize("minimum", [-7.0, 0.0, 7.0])
+def test_nothing_seen_is_no_alarm(minimum):
+    """Nothing seen is infinitely likely."""
+    assert PaperThreshold(minimum).test_ratio(np.inf) == 0

@@ -1,0 +1,342 @@
+"""The front door: constructor arguments only store, fit learns and returns self, every method says what its layer says."""
+
+import inspect
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from probdmp import (
+    FailureDetector,
+    GaussianTrajectory,
+    OnlineExecution,
+    Primitive,
+    PrimitiveLibrary,
+    ProbabilisticDMP,
+    Task,
+    TrackedTrajectory,
+    load,
+    load_detector,
+    synthetic_letters,
+)
+from probdmp.dmp import task_for
+from probdmp.errors import InputError, InputTypeError, ModelFileError, NotFittedError
+from probdmp.execution import roll_out, score_recordings, task_of_recording, track_recording
+
+DEFAULTS = {
+    "n_basis": 30, "weight_model": "pooled", "weight_uncertainty": "independent", "forcing_noise": "predictive",
+    "discretization": "exact", "scaling": "none", "alpha_z": 25.0, "smoothing": 0.05,
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def letters():
+    demos = synthetic_letters(4, letters="sv", dt=0.02)
+    return {letter: [d for d in demos if d.label == letter] for letter in "sv"}
+
+
+@pytest.fixture(scope="module")
+def learned(letters):
+    return ProbabilisticDMP(10).fit(letters["s"])
+
+
+@pytest.fixture(scope="module")
+def library(letters):
+    return PrimitiveLibrary.fit(letters, n_basis=8)
+
+
+def assert_same_trajectory(one, other):
+    for name in ("times", "means", "covariances"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+
+
+# --- constructor and fit ----------------------------------------------------------------------------------------------
+
+
+def test_the_constructor_only_stores():
+    """Even nonsense: it is fit that checks."""
+    nonsense = dict.fromkeys(DEFAULTS, object())
+    p = ProbabilisticDMP(**nonsense)
+    for name, value in nonsense.items():
+        assert getattr(p, name) is value
+    assert p.get_params() == nonsense
+    assert not hasattr(p, "primitive_")
+
+
+def test_defaults():
+    assert ProbabilisticDMP().get_params() == DEFAULTS
+    assert list(inspect.signature(ProbabilisticDMP).parameters) == list(DEFAULTS)
+
+
+def test_as_published_is_the_papers_configuration(letters):
+    p = ProbabilisticDMP.as_published(12)
+    assert p.get_params() == DEFAULTS | {"n_basis": 12, "discretization": "semi_implicit_euler", "scaling": "paper"}
+    assert ProbabilisticDMP.as_published(forcing_noise="posterior").forcing_noise == "posterior"
+    configuration = p.fit(letters["s"]).primitive_.configuration
+    assert (configuration.discretization, configuration.scaling, configuration.n_basis) == ("semi_implicit_euler", "paper", 12)
+
+
+def test_fit_returns_self_and_learns(letters):
+    p = ProbabilisticDMP(10)
+    assert p.fit(letters["s"]) is p
+    assert isinstance(p.primitive_, Primitive)
+    assert p.fit_report_.reproduction_errors.shape == (4, 2)
+    assert p.get_params() == DEFAULTS | {"n_basis": 10}
+
+
+def test_fit_forgets_what_it_learned_before(letters, learned):
+    p = ProbabilisticDMP(10).fit(letters["v"])
+    assert p.fit(letters["s"]).primitive_.identity == learned.primitive_.identity
+
+
+def test_a_fit_that_fails_leaves_what_was_learned(letters):
+    p = ProbabilisticDMP(10).fit(letters["s"])
+    identity = p.primitive_.identity
+    with pytest.raises(InputError):
+        p.fit([np.full((10, 2), np.inf)], dt=0.01)
+    assert p.primitive_.identity == identity
+
+
+def test_fit_takes_what_a_user_has(letters):
+    positions = np.stack([d.positions[:40] for d in letters["s"]])
+    by_array = ProbabilisticDMP(8).fit(positions, dt=0.02)
+    by_list = ProbabilisticDMP(8).fit(list(positions), dt=0.02)
+    by_demos = ProbabilisticDMP(8).fit([replace(d, positions=d.positions[:40], names=(), units="") for d in letters["s"]])
+    assert by_array.primitive_.identity == by_list.primitive_.identity == by_demos.primitive_.identity
+    ProbabilisticDMP(8).fit(letters["s"][0])  # a single demonstration needs no list
+
+
+@pytest.mark.parametrize(
+    ("argument", "value", "error"),
+    [
+        ("n_basis", 0, InputError), ("n_basis", 10.0, InputTypeError), ("n_basis", None, InputTypeError),
+        ("n_basis", 10**6, InputError), ("weight_model", "mixture", InputError), ("weight_uncertainty", "none", InputError),
+        ("forcing_noise", "", InputError), ("discretization", 3, InputError), ("scaling", "printed", InputError),
+        ("alpha_z", -1.0, InputError), ("alpha_z", "25", InputTypeError), ("alpha_z", np.nan, InputError),
+        ("smoothing", 0.7, InputError), ("smoothing", None, InputTypeError),
+    ],
+)  # fmt: skip
+def test_fit_checks_the_arguments(letters, argument, value, error):
+    with pytest.raises(error, match=f"Expected {argument}"):
+        ProbabilisticDMP(**{argument: value}).fit(letters["s"])
+
+
+def test_repr_can_be_pasted():
+    p = ProbabilisticDMP(12, scaling="paper")
+    again = eval(repr(p))
+    assert again.get_params() == p.get_params()
+
+
+def test_not_fitted(letters, tmp_path):
+    p = ProbabilisticDMP()
+    for use in (
+        p.rollout,
+        p.execute,
+        p.sample,
+        lambda: p.track(letters["s"][0]),
+        lambda: p.smooth(letters["s"][0]),
+        lambda: p.score_samples(letters["s"]),
+        lambda: p.save(tmp_path / "a.probdmp"),
+        lambda: FailureDetector().fit(p, letters["s"]),
+    ):
+        with pytest.raises(NotFittedError, match=r"a learned primitive, got one that was not fitted\. Call fit"):
+            use()
+    assert list(tmp_path.iterdir()) == []
+
+
+# --- methods delegate -------------------------------------------------------------------------------------------------
+
+
+def test_rollout(learned):
+    r = learned.rollout()
+    assert type(r) is GaussianTrajectory
+    assert_same_trajectory(r, roll_out(learned.primitive_, task_for(learned.primitive_), 0.02))
+    assert r.positions.shape == r.velocities.shape == r.acceleration_stds.shape == (len(r.times), 2)
+    assert r.covariances.shape == (len(r.times), 2, 3, 3)
+    args = ([1.0, 2.0], [3.0, 4.0], 2.0, 0.05, [5.0, 6.0])
+    task = task_for(learned.primitive_, *args[:3], args[4])
+    assert_same_trajectory(learned.rollout(*args), roll_out(learned.primitive_, task, 0.05))
+    named = learned.rollout(start=args[0], goal=args[1], duration=args[2], dt=args[3], start_velocity=args[4])
+    assert_same_trajectory(named, learned.rollout(*args))
+
+
+def test_track_and_smooth(learned, letters):
+    demo = letters["s"][1]
+    k = learned.track(demo)
+    assert type(k) is TrackedTrajectory
+    assert_same_trajectory(k, track_recording(learned.primitive_, task_of_recording(learned.primitive_, demo), demo))
+    n = demo.n_samples
+    assert k.log_likelihoods.shape == (n,)
+    assert k.innovations.shape == k.innovation_variances.shape == k.contributions.shape == (n, 2)
+    assert_same_trajectory(learned.track(demo.positions), k)  # dt as learned
+    assert_same_trajectory(learned.track(demo.positions.tolist(), dt=0.02), k)
+    s = learned.smooth(demo)
+    assert s.means.shape == k.means.shape
+    np.testing.assert_allclose(s.means[-1], k.means[-1], rtol=1e-9)
+    known = {"start": demo.positions[0], "goal": demo.positions[-1], "duration": demo.duration, "start_velocity": [0.0, 0.0]}
+    assert np.any(learned.track(demo, **known).means != k.means)
+    assert np.any(learned.smooth(demo, **known).means != s.means)
+
+
+def test_execute(learned, letters):
+    demo = letters["s"][0]
+    e = learned.execute(start=demo.positions[0], duration=demo.duration)
+    assert type(e) is OnlineExecution
+    np.testing.assert_allclose(
+        [e.step(o).log_likelihood for o in demo.positions], learned.track(demo).log_likelihoods, rtol=1e-9, atol=1e-9
+    )
+    assert (e.failed, e.verdict) == (False, None)
+
+
+def test_execute_with_a_detector(learned, letters):
+    detector = FailureDetector().fit(learned, letters["s"])
+    e = learned.execute(detector=detector, on_alarm="hold")
+    for _ in range(3):
+        step = e.step([1e5, 1e5])
+    assert e.failed
+    assert step.test_ratio > 1
+    np.testing.assert_array_equal(step.velocity, 0)
+
+
+def test_score_samples_is_the_sum_of_the_tracks(learned, letters):
+    scores = learned.score_samples(letters["s"])
+    assert scores.shape == (4,)
+    np.testing.assert_allclose(scores, [learned.track(d).log_likelihoods.sum() for d in letters["s"]], rtol=1e-10)
+    tasks = [task_for(learned.primitive_, d.positions[0], d.positions[-1], d.duration) for d in letters["s"]]
+    np.testing.assert_array_equal(
+        learned.score_samples(letters["s"], tasks=tasks), score_recordings(learned.primitive_, tasks, letters["s"])
+    )
+    block = np.stack([d.positions[:40] for d in letters["s"]])
+    np.testing.assert_allclose(
+        learned.score_samples(block), [learned.track(x).log_likelihoods.sum() for x in block], rtol=1e-10
+    )
+    np.testing.assert_array_equal(learned.score_samples(block), learned.score_samples(list(block), dt=0.02))
+
+
+def test_sample(learned):
+    x = learned.sample(3, random_state=0)
+    assert len(x) == 3
+    assert x[0].shape == learned.rollout().positions.shape
+    np.testing.assert_array_equal(x, learned.sample(3, random_state=0))
+    assert np.any(x[0] != learned.sample(3, random_state=1)[0])
+    rng = np.random.default_rng(0)
+    assert np.any(learned.sample(random_state=rng)[0] != learned.sample(random_state=rng)[0])
+    (clean,) = learned.sample(start=[1.0, 2.0], duration=1.0, dt=0.05, start_velocity=[0.0, 0.0], sensor_noise=False)
+    assert clean.shape == (21, 2)
+    np.testing.assert_array_equal(clean[0], [1.0, 2.0])
+
+
+def test_what_is_learned_is_not_changed_by_use(letters):
+    p = ProbabilisticDMP(8).fit(letters["v"])
+    identity, params = p.primitive_.identity, p.get_params()
+    p.rollout()
+    p.track(letters["v"][0])
+    p.execute().step()
+    p.sample(2)
+    assert (p.primitive_.identity, p.get_params()) == (identity, params)
+
+
+# --- files ------------------------------------------------------------------------------------------------------------
+
+
+def test_saved_and_loaded_it_scores_bit_for_bit_the_same(learned, letters, tmp_path):
+    path = tmp_path / "s.probdmp"
+    learned.save(path)
+    again = load(path)
+    assert type(again) is ProbabilisticDMP
+    assert again.get_params() == learned.get_params()
+    assert again.primitive_.identity == learned.primitive_.identity
+    assert again.fit_report_ is None
+    np.testing.assert_array_equal(again.score_samples(letters["s"]), learned.score_samples(letters["s"]))
+    np.testing.assert_array_equal(again.score_samples(letters["v"]), learned.score_samples(letters["v"]))
+    assert_same_trajectory(again.rollout(), learned.rollout())
+    assert load_detector(path) is None
+
+
+def test_arguments_given_as_numpy_numbers_can_be_saved(letters, tmp_path):
+    p = ProbabilisticDMP(np.int64(8), alpha_z=np.float32(24.5), smoothing=np.float64(0.1)).fit(letters["s"])
+    p.save(tmp_path / "s.probdmp")
+    assert load(tmp_path / "s.probdmp").primitive_.identity == p.primitive_.identity
+
+
+@pytest.mark.parametrize("likelihood", ["per_step", "cumulative"])
+def test_a_saved_detector_gives_the_same_verdicts(learned, letters, tmp_path, likelihood):
+    detector = FailureDetector(likelihood=likelihood).fit(learned, letters["s"][:2])
+    learned.save(tmp_path / "s.probdmp", detector)
+    again, judge = load(tmp_path / "s.probdmp"), load_detector(tmp_path / "s.probdmp")
+    for one, other in zip(detector.verdicts(letters["s"]), judge.verdicts(letters["s"]), strict=True):
+        assert (one.failed, one.step, one.test_ratio) == (other.failed, other.step, other.test_ratio)
+    assert again.execute(detector=judge).step().test_ratio == 0
+
+
+def test_a_library_keeps_its_labels_in_a_file(library, letters, tmp_path):
+    path = tmp_path / "letters.probdmp"
+    library.save(path, FailureDetector().fit(library, letters))
+    again = PrimitiveLibrary.load(path)
+    assert sorted(again) == ["s", "v"]
+    for label in again:
+        np.testing.assert_array_equal(again[label].score_samples(letters[label]), library[label].score_samples(letters[label]))
+        assert load(path, label).primitive_.identity == library[label].primitive_.identity
+    assert len(load_detector(path).verdicts([*letters["s"], *letters["v"]])) == 8
+    with pytest.raises(InputError, match=r"a label of the file, one of \['s', 'v'\], got None"):
+        load(path)
+    with pytest.raises(InputError, match=r"a label of the file, one of \['s', 'v'\], got 'z'"):
+        load(path, "z")
+
+
+def test_files_that_are_not_there(tmp_path):
+    for read in (load, load_detector, PrimitiveLibrary.load):
+        with pytest.raises(ModelFileError, match="Expected a readable file"):
+            read(tmp_path / "nothing.probdmp")
+
+
+# --- libraries --------------------------------------------------------------------------------------------------------
+
+
+def test_a_library_is_a_mapping(library):
+    assert isinstance(library, Mapping)
+    assert list(library) == list(library.keys()) == ["s", "v"]
+    assert len(library) == 2
+    assert "s" in library
+    assert "z" not in library
+    assert 3 not in library
+    assert library.get("z") is None
+    assert library.get("s") is library["s"]
+    assert repr(library) == "<PrimitiveLibrary: 's', 'v'>"
+    with pytest.raises(InputError, match=r"a label of the library, one of \['s', 'v'\], got 'z'"):
+        library["z"]
+    with pytest.raises(KeyError):
+        library["z"]
+
+
+def test_a_library_learns_each_label_by_itself(library, letters):
+    for label, p in library.items():
+        assert p.n_basis == 8
+        assert p.primitive_.identity == ProbabilisticDMP(8).fit(letters[label]).primitive_.identity
+
+
+def test_a_library_of_bare_arrays(letters):
+    bare = {label: [d.positions for d in demos] for label, demos in letters.items()}
+    assert PrimitiveLibrary.fit(bare, dt=0.02, n_basis=5)["s"].primitive_.dt == 0.02
+
+
+def test_a_library_of_given_primitives(learned):
+    given_primitives = {"a": learned}
+    library = PrimitiveLibrary(given_primitives)
+    given_primitives.clear()
+    assert library["a"] is learned
+
+
+@pytest.mark.parametrize("empty", [PrimitiveLibrary, PrimitiveLibrary.fit])
+def test_an_empty_library_is_refused(empty):
+    with pytest.raises(InputError, match="at least one primitive, got an empty mapping"):
+        empty({})
+
+
+def test_the_task_of_a_user(learned, letters):
+    """A Task made by hand, with lists and plain numbers."""
+    demo = letters["s"][0]
+    by_hand = Task(np.array(demo.positions[0]), np.array(demo.positions[-1]), np.array(demo.duration))
+    own = task_for(learned.primitive_, demo.positions[0], demo.positions[-1], demo.duration)
+    np.testing.assert_array_equal(learned.score_samples([demo], tasks=[by_hand]), learned.score_samples([demo], tasks=[own]))
