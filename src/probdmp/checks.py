@@ -3,6 +3,7 @@
 Code behind the boundary assumes what was checked here and checks nothing again.
 """
 
+import math
 import sys
 from collections.abc import Collection, Sequence
 
@@ -18,6 +19,7 @@ __all__ = [
     "check_choice",
     "check_count",
     "check_fraction",
+    "check_number",
     "check_positive",
     "frozen",
     "shape_text",
@@ -100,7 +102,7 @@ def frozen(array: FloatArray) -> FloatArray:
 def check_positive(value: object, name: str, unit: str = "", hint: str = "") -> float:
     """A finite number > 0."""
     wanted = f"{name} > 0" + (f" in {unit}" if unit else "")
-    number = _number(value, f"{wanted}, one number", hint)
+    number = check_number(value, f"{wanted}, one number", hint)
     if not 0 < number <= LARGEST_MAGNITUDE:
         raise InputError(wanted, repr(value), hint)
     return number
@@ -108,19 +110,27 @@ def check_positive(value: object, name: str, unit: str = "", hint: str = "") -> 
 
 def check_fraction(value: object, name: str, most: float = 1.0) -> float:
     """A number from 0 to `most`."""
-    number = _number(value, f"{name} as one number from 0 to {most:g}", "")
+    number = check_number(value, f"{name} as one number from 0 to {most:g}")
     if not 0 <= number <= most:
         raise InputError(f"{name} as a number from 0 to {most:g}", repr(value))
     return number
 
 
-def _number(value: object, wanted: str, hint: str) -> float:
-    """One real number, of Python or NumPy."""
+def check_number(value: object, wanted: str, hint: str = "") -> float:
+    """One real number, of Python or NumPy; infinite if a float cannot hold it.
+
+    Parameters
+    ----------
+    wanted : what was expected, for the message.
+    """
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating | np.ndarray):
         raise InputTypeError(wanted, f"{value!r:.100}", hint)
     if isinstance(value, np.ndarray) and (value.ndim != 0 or value.dtype.kind not in "fiu"):
         raise InputTypeError(wanted, f"{value!r:.100}", hint)
-    return float(min(value, 2 * LARGEST_MAGNITUDE))
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf
 
 
 def check_count(value: object, name: str, least: int = 1, most: int | None = None, hint: str = "") -> int:

@@ -59,7 +59,7 @@ class Demonstration:
             raise InputTypeError("names in a tuple and channels by name", f"{self.names!r:.100} and {self.channels!r:.100}")
         if not all(isinstance(text, str) for text in (self.label, self.units, *self.names, *self.channels)):
             raise InputTypeError(
-                "names, label, units and channel names as text",
+                "label, units and names as text",
                 f"{(self.label, self.units, *self.names, *self.channels)!r:.200}",
             )
         names = tuple(self.names) or tuple(f"dof{i}" for i in range(n_dof))

@@ -33,10 +33,8 @@ def demonstration_from_times(
     """
     positions = check_array(positions, "positions", ("T", "D"), hint="One row per time.")
     times = check_array(times, "times", (len(positions),), hint="One time per row of positions.")
-    if len(times) < 2:
-        raise InputError("at least two samples", str(len(times)))
-    if positions.shape[1] < 1:
-        raise InputError("positions with at least one degree of freedom", shape_text(positions.shape))
+    if len(times) < 2 or positions.shape[1] < 1:
+        raise InputError("at least two samples of at least one degree of freedom", shape_text(positions.shape))
     steps = np.diff(times)
     if np.any(steps <= 0):
         first = int(np.argmax(steps <= 0))

@@ -63,11 +63,12 @@ class FailureDetector:
         library = learned if isinstance(learned, Mapping) else {"": learned}
         recordings = _by_label(demonstrations, library, "demonstrations")
         asked = _by_label(tasks, library, "tasks") if tasks is not None else dict.fromkeys(library)
-        self.primitives_ = {label: _primitive_of(item) for label, item in library.items()}
+        primitives = {label: _primitive_of(item) for label, item in library.items()}
         self.thresholds_ = {
             primitive.identity: self._threshold(primitive, recordings[label], dt, asked[label])
-            for label, primitive in self.primitives_.items()
+            for label, primitive in primitives.items()
         }
+        self.primitives_ = primitives
         return self
 
     def monitor(self, primitive: Primitive) -> LikelihoodMonitor:
@@ -141,11 +142,16 @@ class FailureDetector:
         for ticks in replay(primitive, tasks or _own_tasks(primitive, recordings), recordings):
             statistic = LikelihoodStatistic(self.likelihood, primitive.ranges)
             minimum = min(minimum, *(statistic.update(observed)[0] for observed in ticks))
+        if not np.isfinite(minimum):
+            raise InputError("demonstrations of which something was measured", "only missing samples")
         return PaperThreshold(minimum)
 
 
 def _primitive_of(learned: Primitive | Learned) -> Primitive:
-    return learned if isinstance(learned, Primitive) else learned.primitive_
+    primitive = learned if isinstance(learned, Primitive) else getattr(learned, "primitive_", None)
+    if not isinstance(primitive, Primitive):
+        raise NotFittedError("a learned primitive", f"{learned!r:.100}", "Call fit(demonstrations) first.")
+    return primitive
 
 
 def _own_tasks(primitive: Primitive, recordings: Sequence[Demonstration]) -> list[Task]:

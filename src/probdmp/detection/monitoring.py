@@ -30,10 +30,14 @@ class LikelihoodStatistic:
         self._so_far = 0.0
 
     def update(self, observed: Observed) -> tuple[float, FloatArray]:
-        """The statistic after one more tick, infinite where nothing was seen, and the (D,) contributions to it."""
-        contributions = standardized_contributions(observed.contributions, observed.innovations, self._ranges)
+        """The statistic after one more tick and the (D,) contributions to it; infinite and zero where nothing was seen."""
+        if np.isnan(observed.innovations).all():
+            return np.inf, np.zeros_like(observed.innovations)
+        contributions = standardized_contributions(
+            observed.contributions, observed.innovations, observed.innovation_variances, self._ranges
+        )
         self._so_far = self._follow(self._so_far, float(contributions.sum()))
-        return np.inf if np.isnan(observed.innovations).all() else self._so_far, contributions
+        return self._so_far, contributions
 
 
 class LikelihoodMonitor:
@@ -73,6 +77,13 @@ def replay(primitive: Primitive, tasks: Sequence[Task], recordings: Sequence[Dem
     for k, (task, recording) in enumerate(zip(tasks, recordings, strict=True)):
         phases = phases_at(recording.times, task.duration)
         yield (
-            Observed(t, t * recording.dt, float(x), forward.log_likelihoods[t, k], forward.innovations[t, k, :, 0])
+            Observed(
+                t,
+                t * recording.dt,
+                float(x),
+                forward.log_likelihoods[t, k],
+                forward.innovations[t, k, :, 0],
+                forward.innovation_covariances[t, k, :, 0, 0],
+            )
             for t, x in enumerate(phases)
         )

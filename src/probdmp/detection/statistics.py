@@ -20,13 +20,19 @@ LIKELIHOODS: dict[str, Callable[[float, float], float]] = {
 """By name: how the statistic of a step follows from that of the step before and the log-likelihood now."""
 
 
-def standardized_contributions(contributions: FloatArray, innovations: FloatArray, ranges: FloatArray) -> FloatArray:
+def standardized_contributions(
+    contributions: FloatArray, innovations: FloatArray, innovation_variances: FloatArray, ranges: FloatArray
+) -> FloatArray:
     """Log-likelihood of each degree of freedom with positions in units of their range.
+
+    What was not seen counts as it was expected to, -(1 + ln 2 pi S) / 2: a sensor that is lost is no failure of the movement.
 
     Parameters
     ----------
-    contributions : (D,) array, nats; 0 where nothing was seen.
+    contributions : (D,) array, nats.
     innovations : (D,) array, data units; NaN where nothing was seen.
+    innovation_variances : S, (D,) array, data units squared.
     ranges : (D,) array, data units.
     """
-    return np.where(np.isnan(innovations), 0.0, contributions + np.log(ranges))
+    expected = -0.5 * (1 + np.log(2 * np.pi * innovation_variances))
+    return np.where(np.isnan(innovations), expected, contributions) + np.log(ranges)

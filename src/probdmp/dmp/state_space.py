@@ -123,14 +123,11 @@ def _initial_state(primitive: Primitive, task: Task, first: ControlInputs) -> tu
     Mean (*batch, D, 3) and covariance (*batch, D, 3, 3).
     """
     duration = task.duration[..., None]
-    start_covariance = primitive.start_covariances
-    if task.start_velocity is None:
-        velocity = np.broadcast_to(primitive.start_velocities / duration, task.start.shape)
-        scale = np.stack([1 / duration, np.ones_like(duration)], axis=-1)
-    else:  # known exactly
-        velocity = task.start_velocity
-        scale = np.stack([np.zeros_like(duration), np.ones_like(duration)], axis=-1)
-    covariance = start_covariance * scale[..., :, None] * scale[..., None, :]
+    given = np.full(task.start.shape, np.nan) if task.start_velocity is None else task.start_velocity
+    known = ~np.isnan(given)
+    velocity = np.where(known, given, primitive.start_velocities / duration)
+    scale = np.stack([np.where(known, 0.0, 1 / duration), np.ones(known.shape)], axis=-1)  # what is known has no variance
+    covariance = primitive.start_covariances * scale[..., :, None] * scale[..., None, :]
     spring = spring_matrix(primitive.configuration.alpha_z, task.duration)[..., None, :]
     lift = np.concatenate([spring[..., None, :], np.broadcast_to(np.eye(2), (*spring.shape[:-1], 2, 2))], axis=-2)
     mean = np.matmul(lift, np.stack([velocity, task.start], axis=-1)[..., None])[..., 0]

@@ -25,7 +25,7 @@ class Task:
     duration: FloatArray
     """T_d, (*batch) array, seconds."""
     start_velocity: FloatArray | None = None
-    """(*batch, D) array, data units per second, known exactly; None: as learned, with its learned variance."""
+    """(*batch, D) array, data units per second, known exactly; NaN or None: as learned, with its learned variance."""
 
 
 def demonstrated_tasks(demonstrations: Sequence[Demonstration]) -> Task:

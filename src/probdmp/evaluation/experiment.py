@@ -179,6 +179,8 @@ def _alarm(verdict: Verdict) -> float | None:
 
 def _classes(demonstrations: Sequence[Demonstration], needed: int) -> dict[str, list[Demonstration]]:
     classes = group_by_label(demonstrations)
+    if not classes:
+        raise TooFewDemonstrationsError("demonstrations", "none")
     scarce = {label: len(members) for label, members in classes.items() if len(members) < needed}
     if scarce:
         least = min(scarce.values())

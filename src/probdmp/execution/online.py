@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from probdmp.checks import FloatArray, check_array, check_choice
+from probdmp.checks import FloatArray, check_array, check_choice, check_number
 from probdmp.dmp import Primitive, Task, linear_gaussian_model, step_count
 from probdmp.dmp.phase import phases_at
 from probdmp.execution.trajectory import ACCELERATION, POSITION, VELOCITY
@@ -34,6 +34,8 @@ class Observed(NamedTuple):
     """(D,) array, nats: the share of each degree of freedom in the log-likelihood."""
     innovations: FloatArray
     """(D,) array, data units: measured minus predicted; NaN where not seen."""
+    innovation_variances: FloatArray
+    """(D,) array, data units squared: variance of the innovations, seen or not."""
 
 
 class Judgement(Protocol):
@@ -152,7 +154,7 @@ class OnlineExecution:
         else:
             measured = check_array(observation, "observation", shape, missing=True)
         if time is not None:
-            due = self._tick_of(float(time))
+            due = self._tick_of(check_number(time, "time as a number of seconds"))
             if due < self._step and self._last is not None:
                 self.n_dropped += 1
                 return self._last
@@ -176,7 +178,8 @@ class OnlineExecution:
         seen = update(self._mean, self._covariance, measured[:, None], model.observation_matrix, model.observation_covariance)
         time = t * self.dt
         phase = float(phases_at(np.asarray(time), self.task.duration))
-        observed = Observed(t, time, phase, seen.log_likelihood, seen.innovation[:, 0])
+        variances = seen.innovation_covariance[:, 0, 0]
+        observed = Observed(t, time, phase, seen.log_likelihood, seen.innovation[:, 0], variances)
         test_ratio = self._monitor.update(observed) if self._monitor is not None else np.nan
         if t - self._first == len(self._drifts):
             self._load(t)
@@ -184,6 +187,8 @@ class OnlineExecution:
         self._mean, self._covariance = predict(
             seen.mean, seen.covariance, model.transition, self._drifts[k], self._process_covariances[k]
         )
+        for array in (self._mean, self._covariance):
+            array.setflags(write=False)  # the caller gets views of them
         self._step += 1
         desired = self._desired()
         return ExecutionStep(

@@ -39,6 +39,7 @@ def task_of_recording(
     duration : seconds; the length of the recording unless given.
     start_velocity : (D,) array, data units per second; as learned, with its variance, unless given.
     """
+    _check_recordings(primitive, [recording])
     if start is None:
         first = recording.positions[0]
         start = np.where(np.isnan(first), primitive.start, first)
@@ -91,13 +92,13 @@ def filter_recordings(primitive: Primitive, tasks: Sequence[Task], recordings: S
 
 
 def _stack_tasks(tasks: Sequence[Task]) -> Task:
-    """Single tasks as one batch. Either all or none give a start velocity."""
-    velocities = [t.start_velocity for t in tasks if t.start_velocity is not None]
+    """Single tasks as one batch."""
+    unknown = np.full(tasks[0].start.shape, np.nan)
     return Task(
         np.stack([t.start for t in tasks]),
         np.stack([t.goal for t in tasks]),
         np.stack([t.duration for t in tasks]),
-        np.stack(velocities) if velocities else None,
+        np.stack([unknown if t.start_velocity is None else t.start_velocity for t in tasks]),
     )
 
 
