@@ -360,8 +360,10 @@ def test_one_task_for_each_execution(models, detectors, letters, n_tasks):
         FailureDetector().fit(models[0], letters[:2], tasks=tasks)
 
 
-@pytest.mark.parametrize("name", ["start", "goal", "duration", "start_velocity"])
-@pytest.mark.parametrize("bad", [np.nan, np.inf])
+@pytest.mark.parametrize(
+    ("name", "bad"),
+    [(name, bad) for name in ("start", "goal", "duration") for bad in (np.nan, np.inf)] + [("start_velocity", np.inf)],
+)
 def test_tasks_made_by_hand_are_checked(models, letters, name, bad):
     good = {"start": np.zeros(2), "goal": np.ones(2), "duration": np.array(1.0)}
     task = dataclasses.replace(Task(**good), **{name: np.full(() if name == "duration" else 2, bad)})

@@ -140,7 +140,7 @@ def test_not_fitted(letters, tmp_path):
         lambda: p.save(tmp_path / "a.probdmp"),
         lambda: FailureDetector().fit(p, letters["s"]),
     ):
-        with pytest.raises(NotFittedError, match=r"a learned primitive, got one that was not fitted\. Call fit"):
+        with pytest.raises(NotFittedError, match=r"a learned primitive, got .*\. Call fit"):
             use()
     assert list(tmp_path.iterdir()) == []
 

@@ -210,7 +210,7 @@ def ticks(values):
     """What a monitor is shown, of one degree of freedom whose standardised log-likelihoods are given."""
     for t, value in enumerate(values):
         seen = np.array([np.nan if value is None else 0.0])
-        yield Observed(t, t * 0.1, 0.9**t, np.array([0.0 if value is None else value]), seen)
+        yield Observed(t, t * 0.1, 0.9**t, np.array([0.0 if value is None else value]), seen, np.ones(1))
 
 
 def monitored(values, minimum=-1.0):

@@ -14,7 +14,7 @@ from probdmp.detection.thresholds import PaperThreshold
 from probdmp.detection.verdict import Verdict
 from probdmp.dmp import Primitive, Task
 from probdmp.errors import InputError, ModelFileError, NotFittedError
-from probdmp.execution import task_of_recording
+from probdmp.execution import check_tasks, task_of_recording
 
 __all__ = ["FailureDetector"]
 
@@ -90,6 +90,8 @@ class FailureDetector:
         self._fitted_thresholds()
         alone = next(iter(self.primitives_.values())) if len(self.primitives_) == 1 else None
         recordings = as_demonstrations(executions, dt if dt is not None or alone is None else alone.dt)
+        if tasks is not None:
+            check_tasks(tasks, recordings)
         verdicts: dict[int, Verdict] = {}
         for label, members in _members_by_label(recordings, alone).items():
             if alone is None and label not in self.primitives_:
@@ -139,7 +141,8 @@ class FailureDetector:
     ) -> PaperThreshold:
         recordings = as_demonstrations(demonstrations, primitive.dt if dt is None else dt)
         minimum = np.inf
-        for ticks in replay(primitive, tasks or _own_tasks(primitive, recordings), recordings):
+        asked = _own_tasks(primitive, recordings) if tasks is None else check_tasks(tasks, recordings)
+        for ticks in replay(primitive, asked, recordings):
             statistic = LikelihoodStatistic(self.likelihood, primitive.ranges)
             minimum = min(minimum, *(statistic.update(observed)[0] for observed in ticks))
         if not np.isfinite(minimum):

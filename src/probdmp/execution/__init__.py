@@ -2,6 +2,7 @@
 
 from probdmp.execution.online import ExecutionStep, Judgement, Monitor, Observed, OnlineExecution
 from probdmp.execution.recordings import (
+    check_tasks,
     filter_recordings,
     score_recordings,
     smooth_recording,
@@ -19,6 +20,7 @@ __all__ = [
     "Observed",
     "OnlineExecution",
     "TrackedTrajectory",
+    "check_tasks",
     "filter_recordings",
     "roll_out",
     "sample_trajectories",

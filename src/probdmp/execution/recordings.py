@@ -16,7 +16,7 @@ from probdmp.errors import InputError
 from probdmp.execution.trajectory import GaussianTrajectory, TrackedTrajectory
 from probdmp.gaussian import FilteredSequence, filter_sequence, smooth_sequence
 
-__all__ = ["filter_recordings", "score_recordings", "smooth_recording", "task_of_recording", "track_recording"]
+__all__ = ["check_tasks", "filter_recordings", "score_recordings", "smooth_recording", "task_of_recording", "track_recording"]
 
 BATCH_SIZE = 256
 """Recordings that are filtered side by side; more would only cost memory."""
@@ -73,6 +73,7 @@ def smooth_recording(primitive: Primitive, task: Task, recording: Demonstration)
 
 def score_recordings(primitive: Primitive, tasks: Sequence[Task], recordings: Sequence[Demonstration]) -> FloatArray:
     """Total log-likelihood of each recording given its task, (N,) array, nats."""
+    check_tasks(tasks, recordings)
     batches = range(0, len(recordings), BATCH_SIZE)
     return np.concatenate(
         [
@@ -80,6 +81,13 @@ def score_recordings(primitive: Primitive, tasks: Sequence[Task], recordings: Se
             for i in batches
         ]
     )
+
+
+def check_tasks(tasks: Sequence[Task], recordings: Sequence[Demonstration]) -> Sequence[Task]:
+    """One task for each recording, or an error."""
+    if len(tasks) != len(recordings):
+        raise InputError(f"one task for each of {len(recordings)} recordings", f"{len(tasks)}")
+    return tasks
 
 
 def filter_recordings(primitive: Primitive, tasks: Sequence[Task], recordings: Sequence[Demonstration]) -> FilteredSequence:

@@ -89,6 +89,7 @@ def _observation_noise(
     model = linear_gaussian_model(primitive, tasks, dts, len(observed))
     rollouts = filter_sequence(model).filtered.means[..., 2]
     squared_errors = np.nanmean((observed - rollouts) ** 2, axis=0)
+    observed[0] = np.nan  # the commanded start is this very sample: it would count as measured without error
     # The sensor alone, or all that the mean movement leaves unexplained: EM begins with whichever is likelier.
     guesses = (np.mean([noise_stds(d.positions) ** 2 for d in demonstrations], axis=0), squared_errors.mean(axis=0))
     return estimate_observation_noise(model, observed, guesses, OBSERVATION_NOISE_FLOOR * primitive.ranges**2), squared_errors
