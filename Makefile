@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test test-slow lint types figures clean
+.PHONY: demo test test-slow lint types figures results clean
 
 demo: $(VENV)/.demo
 	$(BIN)/probdmp demo
@@ -24,6 +24,10 @@ types: $(VENV)/.dev
 # Every picture in the documentation.
 figures: $(VENV)/.demo
 	$(BIN)/python docs/figures.py
+
+# Every table in docs/paper.md, from the recordings that PROBDMP_RECORDINGS points at; about ten minutes.
+results: $(VENV)/.demo
+	$(BIN)/python docs/results.py
 
 clean:
 	rm -rf $(VENV) build src/*.egg-info report.html

@@ -78,6 +78,12 @@ pairs = odd | st.lists(st.floats() | st.sampled_from([None, "1", 1j, 0.0, 1.0]),
 durations = st.sampled_from([1e-300, 1e-160, 1e-100, 1e-40, 1e-6, 0.1, 1.0, 30.0, 1e6, 1e40, 1e100]) | odd
 """Seconds, or not."""
 
+
+def mostly(good, bad):
+    """One bad argument in four, so that most calls have one or two of them and some none."""
+    return st.sampled_from([good, good, good, bad]).flatmap(lambda strategy: strategy)
+
+
 DAMAGES = {
     "none": lambda x, rng: x,
     "nan": lambda x, rng: np.where(rng.random(x.shape) < 0.2, np.nan, x),
@@ -207,66 +213,73 @@ def online(models, detectors, which, observations, times, dt, duration, on_alarm
         refuses_or_works(execution.step)
 
 
-POINTS = arrays(st.just((2,)), ("none", "nan", "all nan", "inf", "int", "1e300", "1e30", "1e-300", "text", "masked", "list"))
+LENGTHS = st.sampled_from([3, 4, 5, 7, 12, 20, 40])
+POINTS = arrays(
+    st.just((2,)), ("none", "none", "nan", "all nan", "inf", "int", "1e300", "1e30", "1e-300", "text", "masked", "list")
+)
+recording = arrays(st.tuples(LENGTHS, st.just(2)))
+recordings = mostly(st.lists(recording, min_size=1, max_size=3), tables | st.lists(tables, max_size=3) | odd)
+points = mostly(st.none() | POINTS, pairs)
+seconds = mostly(st.just(0.02), st.none() | durations)
 which = st.integers(0, 1)
-good_recordings = st.lists(arrays(st.tuples(st.sampled_from([3, 5, 12]), st.just(2))), min_size=1, max_size=3)
-some_recordings = good_recordings | st.lists(tables, max_size=3) | tables | odd
 FIELDS = ["n_basis", "weight_model", "weight_uncertainty", "forcing_noise", "discretization", "scaling", "alpha_z", "smoothing"]
 PROPERTIES = {
     demonstration: {
-        "positions": tables | odd,
-        "dt": st.just(0.01) | odd,
-        "names": st.just(()) | st.lists(odd, max_size=3) | odd,
-        "label": st.just("a") | odd,
+        "positions": mostly(recording, tables | odd),
+        "dt": mostly(st.just(0.01), durations),
+        "names": mostly(st.just(()), st.lists(odd, max_size=3) | odd),
+        "label": mostly(st.just("a"), odd),
     },
     time_stamped_samples: {
-        "times": arrays(st.just((12,)), ("none",)).map(np.sort) | arrays(st.tuples(st.sampled_from([0, 1, 3, 12]))) | odd,
-        "positions": arrays(st.tuples(st.just(12), st.integers(0, 2))) | tables | odd,
-        "dt": st.none() | st.just(0.1) | durations,
+        "times": mostly(
+            arrays(st.just((12,)), ("none",)).map(np.sort), arrays(st.tuples(st.sampled_from([0, 1, 3, 12]))) | odd
+        ),
+        "positions": mostly(arrays(st.just((12, 2))), arrays(st.tuples(st.just(12), st.integers(0, 2))) | tables | odd),
+        "dt": mostly(st.none() | st.just(0.1), durations),
     },
     fit: {
-        "recordings": some_recordings,
-        "dt": st.just(0.01) | durations,
+        "recordings": recordings,
+        "dt": mostly(st.just(0.01), durations),
         "n_basis": st.sampled_from([1, 5, 30]),
-        "published": st.booleans(),
+        "published": mostly(st.just(False), st.just(True)),
         "smoothing": st.sampled_from([0.0, 0.05, 0.5]),
     },
     constructor_arguments: {
-        "name": st.sampled_from(FIELDS),
+        "name": st.sampled_from([*FIELDS, "alpha_z", "alpha_z", "smoothing", "n_basis"]),
         "value": st.sampled_from([1, 2, 25.0, 1e-5, 1e5, 1e30, 0.1, 0.5, "paper", "posterior"]) | odd,
     },
     task_arguments: {
         "which": which,
-        "start": st.none() | POINTS | pairs,
-        "goal": st.none() | POINTS | pairs,
-        "duration": st.none() | durations,
-        "ratio": st.integers(1, 60) | durations,
-        "velocity": st.none() | POINTS | pairs,
+        "start": points,
+        "goal": points,
+        "duration": mostly(st.sampled_from([0.5, 1.0, 3.0]), st.none() | durations),
+        "ratio": mostly(st.integers(20, 60), st.integers(1, 20) | durations),
+        "velocity": points,
     },
     executions: {
         "which": which,
-        "observations": arrays(st.just((12, 2))) | tables | odd,
-        "dt": st.none() | durations,
-        "start": st.none() | POINTS | pairs,
-        "goal": st.none() | POINTS | pairs,
-        "duration": st.none() | durations,
+        "observations": mostly(recording, tables | odd),
+        "dt": seconds,
+        "start": points,
+        "goal": points,
+        "duration": mostly(st.none(), durations),
     },
-    verdicts: {"which": which, "recordings": some_recordings, "dt": st.none() | durations},
-    calibration: {"which": which, "recordings": some_recordings, "dt": st.none() | durations},
+    verdicts: {"which": which, "recordings": recordings, "dt": seconds},
+    calibration: {"which": which, "recordings": recordings, "dt": seconds},
     lists_of_tasks: {
-        "start": st.just(np.zeros(2)) | POINTS | pairs,
-        "goal": st.just(np.ones(2)) | POINTS | pairs,
-        "duration": st.just(np.array(1.0)) | durations,
-        "velocity": st.none() | POINTS | pairs,
-        "count": st.just(2) | st.integers(0, 3),
+        "start": mostly(st.just(np.zeros(2)), POINTS | pairs),
+        "goal": mostly(st.just(np.ones(2)), POINTS | pairs),
+        "duration": mostly(st.just(np.array(1.0)), durations),
+        "velocity": mostly(st.none(), POINTS | pairs),
+        "count": mostly(st.just(2), st.integers(0, 3)),
     },
     online: {
         "which": which,
-        "observations": st.lists(POINTS | pairs, max_size=8),
-        "times": st.lists(st.none() | st.floats(0, 1) | odd, min_size=8, max_size=8),
-        "dt": st.none() | st.just(0.02) | durations,
-        "duration": st.none() | st.just(1.0) | durations,
-        "on_alarm": st.sampled_from(["continue", "hold"]) | odd,
+        "observations": st.lists(mostly(POINTS, pairs), max_size=8),
+        "times": st.lists(mostly(st.none() | st.floats(0, 1), odd), min_size=8, max_size=8),
+        "dt": seconds,
+        "duration": mostly(st.just(1.0), durations),
+        "on_alarm": mostly(st.sampled_from(["continue", "hold"]), odd),
     },
 }
 
@@ -289,9 +302,15 @@ def test_a_typed_error_or_a_finite_result(prop, n_examples, request):
 
 
 @pytest.mark.parametrize("duration", [1e-300, 1e-200, 1e-100, 1e-90, 1e-80, 1e-50, 1e-10, 1e10, 1e50, 1e100])
-def test_durations_of_absurd_size(models, duration):
+def test_durations_of_absurd_size(models, letters, duration):
     for p in models:
-        refuses_or_works(lambda p=p: p.rollout(duration=duration, dt=duration / 50))
+        for n_steps in (1, 50):
+            refuses_or_works(lambda p=p, dt=duration / n_steps: p.rollout(duration=duration, dt=dt))
+            refuses_or_works(lambda p=p, dt=duration / n_steps: p.sample(duration=duration, dt=dt))
+            refuses_or_works(lambda p=p, dt=duration / n_steps: p.execute(duration=duration, dt=dt).step())
+        refuses_or_works(lambda p=p: p.track(letters[0], duration=duration))
+        refuses_or_works(lambda p=p: p.smooth(letters[0], duration=duration))
+        refuses_or_works(lambda p=p: p.score_samples([letters[0].positions], dt=duration))
 
 
 @pytest.mark.parametrize("dt", [5e-324, 1e-320, 1e-300, 1e-90, 1e-50, 1e50, 1e90, 1e99, 1e100])
