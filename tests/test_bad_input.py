@@ -314,8 +314,14 @@ def test_durations_of_absurd_size(models, letters, duration):
 
 
 @pytest.mark.parametrize("dt", [5e-324, 1e-320, 1e-300, 1e-90, 1e-50, 1e50, 1e90, 1e99, 1e100])
-def test_rates_of_absurd_size(letters, dt):
-    refuses_or_works(lambda: ProbabilisticDMP(5).fit([letters[0].positions], dt))
+@pytest.mark.parametrize("smoothing", [0.0, 0.5])
+def test_rates_of_absurd_size(letters, dt, smoothing):
+    refuses_or_works(lambda: ProbabilisticDMP(5, smoothing=smoothing).fit([letters[0].positions], dt))
+
+
+@pytest.mark.parametrize("alpha_z", [1e-300, 1e-100, 1e-30, 1e-5, 1.0, 1e3, 1e4, 1e5, 1e30, 1e100])
+def test_springs_of_absurd_strength(letters, alpha_z):
+    refuses_or_works(lambda: ProbabilisticDMP(5, alpha_z=alpha_z).fit(letters))
 
 
 @pytest.mark.parametrize("observation", [1e20, 1e50, 1e100, -1e100])

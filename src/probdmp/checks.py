@@ -14,6 +14,7 @@ from probdmp.errors import InputError, InputTypeError
 
 __all__ = [
     "LARGEST_MAGNITUDE",
+    "SECONDS",
     "FloatArray",
     "check_array",
     "check_choice",
@@ -21,6 +22,7 @@ __all__ = [
     "check_fraction",
     "check_number",
     "check_positive",
+    "check_seconds",
     "frozen",
     "shape_text",
 ]
@@ -29,6 +31,9 @@ FloatArray = NDArray[np.float64]
 
 LARGEST_MAGNITUDE = 1e100
 """Values beyond this are refused: variances square them, and the square must stay finite."""
+
+SECONDS = (1e-9, 1e9)
+"""Shortest and longest times: far beyond any movement, and far from where their powers overflow."""
 
 
 def shape_text(shape: Sequence[int | str | None]) -> str:
@@ -105,6 +110,16 @@ def check_positive(value: object, name: str, unit: str = "", hint: str = "") -> 
     number = check_number(value, f"{wanted}, one number", hint)
     if not 0 < number <= LARGEST_MAGNITUDE:
         raise InputError(wanted, repr(value), hint)
+    return number
+
+
+def check_seconds(value: object, name: str) -> float:
+    """A time > 0 of a size that a movement can have."""
+    shortest, longest = SECONDS
+    hint = "A time in milliseconds? Divide it by 1000."
+    number = check_positive(value, name, "seconds", hint)
+    if not shortest <= number <= longest:
+        raise InputError(f"{name} from {shortest:g} to {longest:g} seconds", repr(value), hint)
     return number
 
 

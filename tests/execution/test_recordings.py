@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from strategies import make_primitive, primitives, seeds
 
 from probdmp.demonstrations import Demonstration
-from probdmp.dmp import Task, linear_gaussian_model, task_for
+from probdmp.dmp import linear_gaussian_model, task_for
 from probdmp.errors import InputError
 from probdmp.execution import (
     filter_recordings,

@@ -56,7 +56,7 @@ def monitor(
 
     Out: time, position, velocity, acceleration, log_likelihood (nats), test_ratio (above 1: alarm), failed.
     """
-    from probdmp.checks import check_choice, check_positive
+    from probdmp.checks import check_choice, check_seconds
     from probdmp.estimator import PrimitiveLibrary, load_detector
     from probdmp.execution.online import ALARM_REACTIONS
 
@@ -67,7 +67,7 @@ def monitor(
     task = TaskOptions(start, goal, duration, start_velocity)
     if execution == "-":
         with usage():
-            dt = None if dt is None else check_positive(dt, "--dt", "seconds")
+            dt = None if dt is None else check_seconds(dt, "--dt")
             on_alarm = check_choice(on_alarm or "continue", "--on-alarm", ALARM_REACTIONS)
         failed = monitor_stream(library, detector, StreamOptions(label, task, dt, on_alarm))
     elif dt is not None or on_alarm is not None:
@@ -81,13 +81,15 @@ def _monitor_file(
     path: Path, library: "PrimitiveLibrary", detector: "FailureDetector", label: str | None, task: TaskOptions, as_json: bool
 ) -> bool:
     """Judge the recordings of a file and print the verdicts; whether any failed."""
-    from probdmp.execution import task_of_recording
+    from probdmp.dmp import task_for
 
     recordings = read_executions(path, library, label)
     asked = []
     for recording in recordings:
         primitive = primitive_of(library, recording)[1].primitive_
-        asked.append(task_of_recording(primitive, recording, **task.arguments(primitive)))
+        given = task.arguments(primitive)
+        given["start"] = recording.positions[0] if given["start"] is None else given["start"]
+        asked.append(task_for(primitive, **given))
     labels = [recording.label for recording in recordings]
     verdicts = detector.verdicts(recordings, tasks=asked)
     if as_json:

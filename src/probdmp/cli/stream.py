@@ -72,7 +72,7 @@ def _prepare(
     library: "PrimitiveLibrary", options: StreamOptions, asked: Mapping[str, Any]
 ) -> tuple["ProbabilisticDMP", dict[str, Any]]:
     """The primitive and the checked arguments of `execute`, before anything has moved."""
-    from probdmp.checks import check_positive
+    from probdmp.checks import check_seconds
     from probdmp.dmp import task_for
 
     if not isinstance(asked, dict) or not asked.keys() <= TASK_KEYS:
@@ -87,7 +87,7 @@ def _prepare(
     arguments |= {key: value for key, value in asked.items() if key not in ("label", "dt") and value is not None}
     task_for(learned.primitive_, **arguments)
     dt = asked.get("dt", options.dt)
-    return learned, {**arguments, "dt": None if dt is None else check_positive(dt, "dt", "seconds")}
+    return learned, {**arguments, "dt": None if dt is None else check_seconds(dt, "dt")}
 
 
 def _begin(
@@ -97,12 +97,12 @@ def _begin(
     detector: "FailureDetector",
     on_alarm: str,
 ) -> "OnlineExecution":
-    """The execution; it starts where it is first seen, or as learned where it is not."""
+    """The execution; it starts where it is first seen, as far as it is."""
+    from probdmp.checks import check_array
+
     start = arguments["start"]
     if start is None and position is not None:
-        start = [
-            learned if math.isnan(seen) else seen for seen, learned in zip(position, learned.primitive_.start, strict=False)
-        ]
+        start = check_array(position, "position", (learned.primitive_.n_dof,), missing=True, hint=HINT)
     return learned.execute(**{**arguments, "start": start}, detector=detector, on_alarm=on_alarm)
 
 
@@ -117,6 +117,7 @@ def _tick(item: Mapping[str, Any]) -> tuple[list[float] | None, float | None]:
         if not isinstance(position, list) or any(isinstance(entry, bool) for entry in position):
             raise InputTypeError("position as a list of numbers or null", f"{position!r:.60}", HINT)
         position = [math.nan if entry is None else entry for entry in position]
+        check_array(position, "position", ("D",), missing=True, hint=HINT)
     return position, None if time is None else float(check_array(time, "time", ()))
 
 

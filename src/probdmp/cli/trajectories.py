@@ -38,7 +38,7 @@ def save_arrays(path: Path, arrays: Mapping[str, Any]) -> None:
     from probdmp.io import write_atomically
 
     buffer = io.BytesIO()
-    np.savez(buffer, allow_pickle=False, **arrays)
+    np.savez(buffer, **arrays)
     with usage():
         write_atomically(path, buffer.getvalue())
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from probdmp.checks import FloatArray, check_array, check_positive, frozen, shape_text
+from probdmp.checks import FloatArray, check_array, check_seconds, frozen, shape_text
 from probdmp.errors import InputError, InputTypeError
 
 __all__ = ["LONGEST_RECORDING", "SHORTEST_RECORDING", "Demonstration", "as_demonstrations", "stack_positions"]
@@ -62,7 +62,7 @@ class Demonstration:
                 "label, units and names as text",
                 f"{(self.label, self.units, *self.names, *self.channels)!r:.200}",
             )
-        names = tuple(self.names) or tuple(f"dof{i}" for i in range(n_dof))
+        names = tuple(self.names) or _default_names(n_dof)
         if len(names) != n_dof or len(set(names)) != n_dof:
             raise InputError(f"{n_dof} different names, one per column", repr(names))
         if not set(names).isdisjoint(self.channels):
@@ -72,7 +72,7 @@ class Demonstration:
             for name, values in self.channels.items()
         }
         object.__setattr__(self, "positions", frozen(positions))
-        object.__setattr__(self, "dt", check_positive(self.dt, "dt", "seconds", MILLISECONDS_HINT))
+        object.__setattr__(self, "dt", check_seconds(self.dt, "dt"))
         object.__setattr__(self, "names", names)
         object.__setattr__(self, "channels", MappingProxyType(channels))
 
@@ -83,6 +83,11 @@ class Demonstration:
     def __repr__(self) -> str:
         label = f" {self.label!r}" if self.label else ""
         return f"<Demonstration{label}: {self.n_samples} samples × {self.n_dof} DoF, {self.duration:g} s>"
+
+    @property
+    def has_names(self) -> bool:
+        """Whether the degrees of freedom were given names; bare arrays fit any."""
+        return self.names != _default_names(self.n_dof)
 
     @property
     def n_samples(self) -> int:
@@ -103,6 +108,10 @@ class Demonstration:
     def duration(self) -> float:
         """Seconds from the first sample to the last, (T - 1) dt."""
         return (self.n_samples - 1) * self.dt
+
+
+def _default_names(n_dof: int) -> tuple[str, ...]:
+    return tuple(f"dof{i}" for i in range(n_dof))
 
 
 def as_demonstrations(
@@ -139,10 +148,10 @@ def as_demonstrations(
     demonstrations = [_as_demonstration(item, k, dt) for k, item in enumerate(data)]
     first = demonstrations[0]
     for k, other in enumerate(demonstrations):
-        if other.names != first.names:
+        if (other.names, other.units) != (first.names, first.units):
             raise InputError(
-                f"all demonstrations with the same degrees of freedom {first.names}",
-                f"{other.names} in demonstration {k}",
+                f"all demonstrations with the same degrees of freedom {first.names} in the same units {first.units!r}",
+                f"{other.names} in {other.units!r} in demonstration {k}",
             )
     return demonstrations
 

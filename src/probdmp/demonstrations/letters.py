@@ -15,7 +15,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from probdmp.checks import FloatArray, check_array, check_choice, check_count, check_positive
+from probdmp.checks import FloatArray, check_array, check_choice, check_count, check_seconds
 from probdmp.demonstrations.demonstration import MILLISECONDS_HINT, Demonstration
 from probdmp.errors import InputError, InputTypeError
 
@@ -117,7 +117,7 @@ def synthetic_letters(
     """
     n_demonstrations = check_count(n_demonstrations, "n_demonstrations")
     seed = check_count(seed, "seed", least=0)
-    dt = check_positive(dt, "dt", "seconds", MILLISECONDS_HINT)
+    dt = check_seconds(dt, "dt")
     shortest, longest = SAMPLING_INTERVALS
     if not shortest <= dt <= longest:
         raise InputError(f"dt from {shortest:g} to {longest:g} seconds", repr(dt), MILLISECONDS_HINT)

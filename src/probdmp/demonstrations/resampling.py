@@ -3,11 +3,14 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from probdmp.checks import check_array, check_positive, shape_text
-from probdmp.demonstrations.demonstration import LONGEST_RECORDING, MILLISECONDS_HINT, Demonstration
+from probdmp.checks import check_array, check_seconds, shape_text
+from probdmp.demonstrations.demonstration import LONGEST_RECORDING, Demonstration
 from probdmp.errors import InputError
 
 __all__ = ["demonstration_from_times"]
+
+CLOCK_TOLERANCE = 1e-3
+"""Fraction of a step by which the last time may miss a sample."""
 
 
 def demonstration_from_times(
@@ -24,30 +27,32 @@ def demonstration_from_times(
     ----------
     times : (T,) array, seconds, strictly increasing.
     positions : (T, D) array, data units.
-    dt : seconds between the new samples; the median spacing of `times` unless given.
+    dt : seconds between the new samples; about the median spacing of `times` unless given, so that the last sample is kept.
 
     Raises
     ------
     InputError
         If times do not increase, or the recording would have too many samples.
     """
-    positions = check_array(positions, "positions", ("T", "D"), hint="One row per time.")
-    times = check_array(times, "times", (len(positions),), hint="One time per row of positions.")
-    if len(times) < 2 or positions.shape[1] < 1:
-        raise InputError("at least two samples of at least one degree of freedom", shape_text(positions.shape))
-    steps = np.diff(times)
+    path = check_array(positions, "positions", ("T", "D"), hint="One row per time.")
+    clock = check_array(times, "times", (len(path),), hint="One time per row of positions.")
+    if len(clock) < 2 or path.shape[1] < 1:
+        raise InputError("at least two samples of at least one degree of freedom", shape_text(path.shape))
+    steps = np.diff(clock)
     if np.any(steps <= 0):
         first = int(np.argmax(steps <= 0))
         raise InputError(
             "times that increase strictly",
-            f"{times[first]!r} s followed by {times[first + 1]!r} s at sample {first + 1}",
+            f"{clock[first]!r} s followed by {clock[first + 1]!r} s at sample {first + 1}",
             "Sort the samples and drop repeated ones.",
         )
-    step = float(np.median(steps)) if dt is None else check_positive(dt, "dt", "seconds", MILLISECONDS_HINT)
-    n_samples = (times[-1] - times[0]) / step + 1
-    if n_samples > LONGEST_RECORDING:
-        raise InputError(f"at most {LONGEST_RECORDING} samples", f"{n_samples:.3g}", "Choose a larger dt, or cut.")
-    # A last time within rounding of a whole step is a whole step.
-    grid = times[0] + step * np.arange(int(n_samples * (1 + 1e-9)))
-    resampled = np.column_stack([np.interp(grid, times, column) for column in positions.T])
+    since = clock - clock[0]  # clocks count from 1970, and a double then resolves a quarter of a microsecond
+    if dt is None:
+        dt = float(since[-1]) / max(round(float(since[-1]) / float(np.median(steps))), 1)
+    step = check_seconds(dt, "dt")
+    n_steps = float(since[-1]) / step + CLOCK_TOLERANCE
+    if n_steps >= LONGEST_RECORDING:
+        raise InputError(f"at most {LONGEST_RECORDING} samples", f"{n_steps:.3g}", "Choose a larger dt, or cut.")
+    grid = step * np.arange(int(n_steps) + 1)
+    resampled = np.column_stack([np.interp(grid, since, column) for column in path.T])
     return Demonstration(resampled, step, label, names, units)

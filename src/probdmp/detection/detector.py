@@ -13,7 +13,7 @@ from probdmp.detection.statistics import LIKELIHOODS
 from probdmp.detection.thresholds import PaperThreshold
 from probdmp.detection.verdict import Verdict
 from probdmp.dmp import Primitive, Task
-from probdmp.errors import InputError, ModelFileError, NotFittedError
+from probdmp.errors import InputError, NotFittedError
 from probdmp.execution import check_tasks, task_of_recording
 
 __all__ = ["FailureDetector"]
@@ -55,8 +55,9 @@ class FailureDetector:
         ----------
         learned : a learned primitive, or a library of them by label; demonstrations and tasks then come by label too.
         dt : seconds between samples of bare arrays; as learned unless given.
-        tasks : what each demonstration was asked to do; its own first row and length and the learned goal unless given. Say
-            as much as will be known when executing: the detector takes the spread it is shown for normal.
+        tasks : what each demonstration was asked to do. Unless given, to start at its own first row and to reach the learned
+            goal in the learned time: what `execute(start=…)` knows. Say as much as will be known when executing, for the
+            detector takes the spread it is shown for normal.
         """
         check_choice(self.rule, "rule", RULES)
         check_choice(self.likelihood, "likelihood", LIKELIHOODS)
@@ -88,16 +89,13 @@ class FailureDetector:
         dt, tasks : as in `fit`, one task for each execution.
         """
         self._fitted_thresholds()
-        alone = next(iter(self.primitives_.values())) if len(self.primitives_) == 1 else None
-        recordings = as_demonstrations(executions, dt if dt is not None or alone is None else alone.dt)
+        dts = {primitive.dt for primitive in self.primitives_.values()}
+        recordings = as_demonstrations(executions, dts.pop() if dt is None and len(dts) == 1 else dt)
         if tasks is not None:
             check_tasks(tasks, recordings)
         verdicts: dict[int, Verdict] = {}
-        for label, members in _members_by_label(recordings, alone).items():
-            if alone is None and label not in self.primitives_:
-                raise InputError(f"executions labelled as one of {sorted(self.primitives_)}", repr(label))
-            primitive = alone or self.primitives_[label]
-            chosen = [recordings[k] for k in members]
+        for label, members in self._members(recordings).items():
+            primitive, chosen = self.primitives_[label], [recordings[k] for k in members]
             asked = [tasks[k] for k in members] if tasks is not None else _own_tasks(primitive, chosen)
             for k, ticks in zip(members, replay(primitive, asked, chosen), strict=True):
                 monitor = self.monitor(primitive)
@@ -119,9 +117,16 @@ class FailureDetector:
 
     @classmethod
     def from_state(cls, state: Mapping[str, Any], primitives: Mapping[str, Primitive]) -> Self:
-        """A fitted detector from a model file: its state and the primitives it was fitted to, by label."""
-        if set(state) != {"rule", "likelihood", "minima"} or not isinstance(state["minima"], Mapping):
-            raise ModelFileError("a detector with rule, likelihood and minima", str(sorted(state)), "Fit and save it again.")
+        """A fitted detector from its state and the primitives it was fitted to, by label.
+
+        Raises
+        ------
+        InputError, InputTypeError
+            If the state is not one, or that of a detector for other primitives.
+        """
+        identities = {primitive.identity for primitive in primitives.values()}
+        if set(state) != {"rule", "likelihood", "minima"} or not identities == set(state["minima"]):
+            raise InputError("a detector with rule, likelihood and a minimum for each primitive", str(sorted(state)))
         detector = cls(
             rule=check_choice(state["rule"], "rule", RULES),
             likelihood=check_choice(state["likelihood"], "likelihood", LIKELIHOODS),
@@ -135,6 +140,17 @@ class FailureDetector:
         if not hasattr(self, "thresholds_"):
             raise NotFittedError("a fitted detector", "one without thresholds", "Call fit(primitive, demonstrations) first.")
         return self.thresholds_
+
+    def _members(self, recordings: Sequence[Demonstration]) -> dict[str, list[int]]:
+        """Which recordings are executions of which primitive; one that is alone needs no label."""
+        alone = next(iter(self.primitives_)) if len(self.primitives_) == 1 else None
+        members: dict[str, list[int]] = {}
+        for k, recording in enumerate(recordings):
+            label = alone if alone is not None and "" in (alone, recording.label) else recording.label
+            if label not in self.primitives_:
+                raise InputError(f"executions labelled as one of {sorted(self.primitives_)}", repr(label))
+            members.setdefault(label, []).append(k)
+        return members
 
     def _threshold(
         self, primitive: Primitive, demonstrations: Recordings, dt: float | None, tasks: Sequence[Task] | None
@@ -158,7 +174,7 @@ def _primitive_of(learned: Primitive | Learned) -> Primitive:
 
 
 def _own_tasks(primitive: Primitive, recordings: Sequence[Demonstration]) -> list[Task]:
-    return [task_of_recording(primitive, recording) for recording in recordings]
+    return [task_of_recording(primitive, recording, duration=primitive.duration) for recording in recordings]
 
 
 def _by_label(values: Any, library: Mapping[str, Any], name: str) -> Mapping[str, Any]:
@@ -169,11 +185,3 @@ def _by_label(values: Any, library: Mapping[str, Any], name: str) -> Mapping[str
         given = sorted(values) if isinstance(values, Mapping) else type(values).__name__
         raise InputError(f"{name} by label for each of {sorted(library)}", str(given))
     return values
-
-
-def _members_by_label(recordings: Sequence[Demonstration], alone: Primitive | None) -> dict[str, list[int]]:
-    """Which recordings belong to which primitive."""
-    members: dict[str, list[int]] = {}
-    for k, recording in enumerate(recordings):
-        members.setdefault("" if alone is not None else recording.label, []).append(k)
-    return members

@@ -30,7 +30,7 @@ class LikelihoodStatistic:
         self._so_far = 0.0
 
     def update(self, observed: Observed) -> tuple[float, FloatArray]:
-        """The statistic after one more tick and the (D,) contributions to it; infinite and zero where nothing was seen."""
+        """The statistic after one more tick, infinite if nothing was seen, and what each degree of freedom said in it, (D,)."""
         if np.isnan(observed.innovations).all():
             return np.inf, np.zeros_like(observed.innovations)
         contributions = standardized_contributions(
@@ -47,7 +47,7 @@ class LikelihoodMonitor:
         self._statistic = LikelihoodStatistic(likelihood, primitive.ranges)
         self._threshold = threshold
         nothing = np.zeros(primitive.n_dof)
-        self._verdict = Verdict(False, 0, 0.0, 1.0, -1.0, nothing, primitive.names)
+        self._verdict = Verdict(False, 0, 0.0, 1.0, 0.0, nothing, primitive.names)
 
     @property
     def verdict(self) -> Verdict:

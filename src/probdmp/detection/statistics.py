@@ -5,6 +5,7 @@ here by name. Densities have units, so positions are taken in units of each degr
 each number seen.
 """
 
+import operator
 from collections.abc import Callable
 
 import numpy as np
@@ -13,10 +14,12 @@ from probdmp.checks import FloatArray
 
 __all__ = ["LIKELIHOODS", "standardized_contributions"]
 
-LIKELIHOODS: dict[str, Callable[[float, float], float]] = {
-    "per_step": lambda so_far, now: now,
-    "cumulative": lambda so_far, now: so_far + now,
-}
+
+def _latest(so_far: float, now: float) -> float:
+    return now
+
+
+LIKELIHOODS: dict[str, Callable[[float, float], float]] = {"per_step": _latest, "cumulative": operator.add}
 """By name: how the statistic of a step follows from that of the step before and the log-likelihood now."""
 
 

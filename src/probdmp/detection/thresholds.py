@@ -24,7 +24,10 @@ class PaperThreshold:
         """The statistic below which an execution has failed, nats."""
         return self.minimum - abs(self.minimum)
 
-    def test_ratio(self, statistic: float) -> float:
-        """How far below the minimum the statistic has fallen, in units of |minimum|; 0 where it has not."""
-        shortfall = max(self.minimum - statistic, 0.0)
-        return shortfall / max(abs(self.minimum), 1 / LARGEST_MAGNITUDE)
+    def test_ratio(self, log_likelihood: float) -> float:
+        """Statistic over threshold, above 1 for an alarm; 0 where the log-likelihood is beyond doubt.
+
+        The statistic is how far the log-likelihood has fallen: below 0, or below the minimum where that is positive.
+        """
+        top = max(self.minimum, 0.0)
+        return max(top - log_likelihood, 0.0) / max(top - self.level, 1 / LARGEST_MAGNITUDE)

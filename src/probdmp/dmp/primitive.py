@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import ArrayLike
 
-from probdmp.checks import FloatArray, check_array, check_choice, check_count, check_positive, frozen
+from probdmp.checks import FloatArray, check_array, check_choice, check_count, check_positive, check_seconds, frozen
 from probdmp.dmp.task import Task
 from probdmp.dmp.transformation_system import DISCRETIZATIONS
 from probdmp.errors import InputError, InputTypeError
@@ -15,6 +15,9 @@ __all__ = ["FORCING_NOISES", "PUBLISHED", "SCALINGS", "Configuration", "Primitiv
 
 SCALINGS = ("none", "paper")
 FORCING_NOISES = ("posterior", "predictive")
+
+STIFFEST = (1e-3, 1e4)
+"""Least and largest alpha_z."""
 
 SCALING_GUARD = 0.2
 """A degree of freedom whose mean displacement is less than this fraction of its range is not scaled."""
@@ -35,9 +38,16 @@ class Configuration:
     forcing_noise: str = "predictive"
     """`"posterior"`: the variance of the mean forcing term; `"predictive"`: with the regression noise 1 / beta."""
 
+    @property
+    def stiffness(self) -> float:
+        """alpha_z beta_z, by which the distance to the goal accelerates the movement, in units of the duration."""
+        return self.alpha_z**2 / 4
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "n_basis", check_count(self.n_basis, "n_basis", most=1000))
         object.__setattr__(self, "alpha_z", check_positive(self.alpha_z, "alpha_z"))
+        if not STIFFEST[0] <= self.alpha_z <= STIFFEST[1]:
+            raise InputError(f"alpha_z from {STIFFEST[0]:g} to {STIFFEST[1]:g}", repr(self.alpha_z), "25 is usual.")
         check_choice(self.discretization, "discretization", DISCRETIZATIONS)
         check_choice(self.scaling, "scaling", SCALINGS)
         check_choice(self.forcing_noise, "forcing_noise", FORCING_NOISES)
@@ -79,7 +89,7 @@ class Primitive:
     start_velocities: FloatArray
     """v0, (D,) array in phase units: T_d p'(0), data units, so that a slower execution starts slower."""
     start_covariances: FloatArray
-    """Q_0, (D, 2, 2) array over (T_d p'(0), p(0)) around v0 and the given start, data units squared."""
+    """Q_0, (D, 2, 2) array over (T_d p'(0), p(0)) between demonstrations, data units squared; what a task gives is known."""
     duration: float
     """Mean duration of the demonstrations, seconds."""
     dt: float
@@ -106,7 +116,8 @@ class Primitive:
         for name in ("weight_covariances", "start_covariances"):
             _check_semidefinite(getattr(self, name), name)
         for name in ("duration", "dt", "phase_step"):
-            object.__setattr__(self, name, check_positive(getattr(self, name), name))
+            check = check_positive if name == "phase_step" else check_seconds
+            object.__setattr__(self, name, check(getattr(self, name), name))
         object.__setattr__(self, "n_demonstrations", check_count(self.n_demonstrations, "n_demonstrations"))
         if not all(isinstance(text, str) for text in (*self.names, self.units)):
             raise InputTypeError("names and units as text", f"{self.names!r}, {self.units!r}")
@@ -137,11 +148,15 @@ class Primitive:
             digest.update(value.tobytes() if isinstance(value, np.ndarray) else repr(value).encode())
         return digest.hexdigest()
 
+    def starts(self, task: Task) -> FloatArray:
+        """p0, (*batch, D) array: where a task starts, as far as it is known; the mean start elsewhere."""
+        return np.where(np.isnan(task.start), self.start, task.start)
+
     def amplitudes(self, task: Task) -> FloatArray:
         """s, (*batch, D) array: by how much a task scales the forcing term."""
         scaled = np.array(self.scaled)
         reference = np.where(scaled, self.goal_displacements, 1.0)
-        return np.where(scaled, (task.goal - task.start) / reference, 1.0)
+        return np.where(scaled, (task.goal - self.starts(task)) / reference, 1.0)
 
 
 def task_for(
@@ -155,16 +170,16 @@ def task_for(
 
     Parameters
     ----------
-    start, goal : (D,) arrays, data units.
+    start, goal : (D,) arrays, data units. Where the start is NaN it is uncertain, as those of the demonstrations were.
     duration : seconds.
-    start_velocity : (D,) array, data units per second.
+    start_velocity : (D,) array, data units per second; uncertain likewise where it is NaN, or not given.
     """
     shape, hint = (primitive.n_dof,), f"One number for each of {', '.join(primitive.names)}."
     return Task(
-        primitive.start if start is None else check_array(start, "start", shape, hint=hint),
-        primitive.goal if goal is None else check_array(goal, "goal", shape, hint=hint),
-        np.asarray(primitive.duration if duration is None else check_positive(duration, "duration", "seconds")),
-        None if start_velocity is None else check_array(start_velocity, "start_velocity", shape, hint=hint),
+        check_array(primitive.start if start is None else start, "start", shape, missing=True, hint=hint),
+        check_array(primitive.goal if goal is None else goal, "goal", shape, hint=hint),
+        np.asarray(primitive.duration if duration is None else check_seconds(duration, "duration")),
+        None if start_velocity is None else check_array(start_velocity, "start_velocity", shape, missing=True, hint=hint),
     )
 
 

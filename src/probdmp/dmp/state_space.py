@@ -8,10 +8,10 @@ f[t] ~ N(phi[t]^T mu_w, sigma_f^2[t]), and enters through the input u[t] = alpha
 
 Uncertainty about the shape of the movement becomes process noise that depends on the phase.
 
-sigma_f^2 belongs to the phase step of the training data: white noise that is redrawn k times as often must have k times the
-variance to move the system as far. At another step it is multiplied by the ratio of the steps; position and
-velocity bands then do not depend on the control rate. The acceleration of such a system is itself white: its band grows as
-1 / sqrt(dt).
+sigma_f^2 belongs to the phase step of the training data: white noise that is redrawn k times as often must have about k times
+the variance to move the system as far, so at another step it is corrected (`Discretization.noise_variance`). Position
+and velocity bands then hardly depend on the control rate. The acceleration of such a system is itself white: its band
+grows as 1 / sqrt(dt).
 
 Source: Meier & Schaal 2016, "Deriving the Probabilistic DMP Model".
 """
@@ -26,7 +26,7 @@ from probdmp.dmp.forcing_term import forcing_term
 from probdmp.dmp.phase import phases_at
 from probdmp.dmp.primitive import Primitive
 from probdmp.dmp.task import Task
-from probdmp.dmp.transformation_system import DISCRETIZATIONS, spring_matrix
+from probdmp.dmp.transformation_system import ACCELERATION, DISCRETIZATIONS, spring_matrix
 from probdmp.errors import InputError
 from probdmp.gaussian import LinearGaussianModel
 
@@ -73,10 +73,12 @@ def control_inputs(primitive: Primitive, task: Task, dt: FloatArray | float, ste
     dt, duration = np.asarray(dt, dtype=np.float64), task.duration
     times = steps.reshape(-1, *(1,) * max(dt.ndim, duration.ndim)) * dt
     forcing = forcing_term(primitive, phases_at(times, duration))
-    amplitude = primitive.amplitudes(task)
-    rate_correction = (primitive.phase_step * duration / dt)[..., None]
-    spring = primitive.configuration.alpha_z**2 / 4  # alpha_z beta_z
-    return ControlInputs(spring * task.goal + amplitude * forcing.means, amplitude**2 * forcing.variances * rate_correction)
+    amplitude, configuration = primitive.amplitudes(task), primitive.configuration
+    variance_at = DISCRETIZATIONS[configuration.discretization].noise_variance
+    learned_step = np.asarray(configuration.alpha_z * primitive.phase_step)
+    correction = (variance_at(configuration.alpha_z * dt / duration) / variance_at(learned_step))[..., None]
+    means = configuration.stiffness * task.goal + amplitude * forcing.means
+    return ControlInputs(means, amplitude**2 * forcing.variances * correction)
 
 
 def linear_gaussian_model(
@@ -99,15 +101,15 @@ def linear_gaussian_model(
     dt = np.asarray(dt, dtype=np.float64)
     scheme = DISCRETIZATIONS[primitive.configuration.discretization]
     system = scheme.step(primitive.configuration.alpha_z, task.duration, dt)
-    inputs = control_inputs(
-        primitive, task, dt, np.arange(n_steps - 1, dtype=np.float64) + (first_step + scheme.forcing_offset)
-    )
+    steps = first_step + np.arange(n_steps - 1, dtype=np.float64)
+    held = [weight * control_inputs(primitive, task, dt, steps + place).means for place, weight in scheme.forcing_stencil]
+    variances = control_inputs(primitive, task, dt, steps + scheme.noise_offset).variances
     mean, covariance = _initial_state(primitive, task, control_inputs(primitive, task, dt, np.zeros(1)))
     return LinearGaussianModel(
         transition=system.transition[..., None, :, :],
         input_matrix=system.input_vector[..., None, :, None],
-        inputs=inputs.means[..., None],
-        input_covariances=inputs.variances[..., None, None],
+        inputs=np.sum(held, axis=0)[..., None],
+        input_covariances=variances[..., None, None],
         observation_matrix=POSITION_SENSOR,
         observation_covariance=primitive.observation_variances[:, None, None],
         initial_mean=mean,
@@ -124,14 +126,14 @@ def _initial_state(primitive: Primitive, task: Task, first: ControlInputs) -> tu
     """
     duration = task.duration[..., None]
     given = np.full(task.start.shape, np.nan) if task.start_velocity is None else task.start_velocity
-    known = ~np.isnan(given)
-    velocity = np.where(known, given, primitive.start_velocities / duration)
-    scale = np.stack([np.where(known, 0.0, 1 / duration), np.ones(known.shape)], axis=-1)  # what is known has no variance
+    velocity = np.where(np.isnan(given), primitive.start_velocities / duration, given)
+    # What is known has no variance.
+    scale = np.stack([np.where(np.isnan(given), 1 / duration, 0.0), np.where(np.isnan(task.start), 1.0, 0.0)], axis=-1)
     covariance = primitive.start_covariances * scale[..., :, None] * scale[..., None, :]
     spring = spring_matrix(primitive.configuration.alpha_z, task.duration)[..., None, :]
     lift = np.concatenate([spring[..., None, :], np.broadcast_to(np.eye(2), (*spring.shape[:-1], 2, 2))], axis=-2)
-    mean = np.matmul(lift, np.stack([velocity, task.start], axis=-1)[..., None])[..., 0]
+    mean = np.matmul(lift, np.stack([velocity, primitive.starts(task)], axis=-1)[..., None])[..., 0]
     full = lift @ covariance @ lift.mT
-    mean[..., 0] += first.means[0] / duration**2
-    full[..., 0, 0] += first.variances[0] / duration**4
+    mean[..., ACCELERATION] += first.means[0] / duration**2
+    full[..., ACCELERATION, ACCELERATION] += first.variances[0] / duration**4
     return mean, full

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from probdmp.checks import FloatArray
+from probdmp.checks import SECONDS, FloatArray, check_array, frozen, shape_text
 from probdmp.demonstrations import Demonstration
+from probdmp.errors import InputError
 
 __all__ = ["Task", "demonstrated_tasks"]
 
@@ -19,13 +20,28 @@ class Task:
     """
 
     start: FloatArray
-    """p0, (*batch, D) array, data units."""
+    """p0, (*batch, D) array, data units; NaN where it is not known: as learned, with its learned variance."""
     goal: FloatArray
     """g, (*batch, D) array, data units."""
     duration: FloatArray
     """T_d, (*batch) array, seconds."""
     start_velocity: FloatArray | None = None
     """(*batch, D) array, data units per second, known exactly; NaN or None: as learned, with its learned variance."""
+
+    def __post_init__(self) -> None:
+        duration = np.asarray(self.duration, dtype=np.float64)
+        shortest, longest = SECONDS
+        if not np.all((duration >= shortest) & (duration <= longest)):  # NaN is neither
+            raise InputError(f"duration from {shortest:g} to {longest:g} seconds", f"{self.duration}")
+        object.__setattr__(self, "duration", frozen(duration))
+        axes = [*duration.shape, "D"]
+        for name in ("start", "goal", "start_velocity"):
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, frozen(check_array(value, name, axes, missing=name != "goal")))
+        shapes = {value.shape for value in (self.start, self.goal, self.start_velocity) if value is not None}
+        if len(shapes) > 1:
+            raise InputError("start, goal and start_velocity of one shape", " and ".join(map(shape_text, sorted(shapes))))
 
 
 def demonstrated_tasks(demonstrations: Sequence[Demonstration]) -> Task:

@@ -11,8 +11,9 @@ schemes turn it into s[t] = A s[t-1] + B u[t-1] on the state s = (p'', p', p):
     A = | 0   1 + a1 dt      a0 dt     |,   B = tau^2   |  dt  |,   f at the phase of the step's start
         | 0   dt + a1 dt^2   1+a0 dt^2 |                | dt^2 |
 
-`exact` is the zero-order-hold solution (p', p)[t] = Phi (p', p)[t-1] + Gamma u with f at the phase of the step's middle. The
-acceleration is the mean over the step, (p'[t] - p'[t-1]) / dt.
+`exact` is the zero-order-hold solution (p', p)[t] = Phi (p', p)[t-1] + Gamma u. The acceleration is the mean over the step,
+(p'[t] - p'[t-1]) / dt. What is held is not quite f at the middle of the step: the position answers to held values h as to
+h + dt^2 h'' / 24, so h = f - dt^2 f'' / 24 with f'' from the values at both ends. The path then hardly depends on dt.
 
 The paper prints B = (1, 0, 0)^T and an A on the previous velocity; docs/paper.md says why that cannot be meant.
 """
@@ -26,7 +27,18 @@ import numpy as np
 from probdmp.checks import FloatArray
 from probdmp.errors import InputError
 
-__all__ = ["DISCRETIZATIONS", "DiscreteSystem", "Discretization", "spring_matrix"]
+__all__ = [
+    "ACCELERATION",
+    "DISCRETIZATIONS",
+    "POSITION",
+    "VELOCITY",
+    "DiscreteSystem",
+    "Discretization",
+    "spring_matrix",
+]
+
+ACCELERATION, VELOCITY, POSITION = 0, 1, 2
+"""The order of the state, in every array that has one."""
 
 STABILITY_LIMIT = float(np.sqrt(32) - 4)
 """Semi-implicit Euler is unstable for alpha_z tau dt beyond this, about 1.66."""
@@ -47,8 +59,13 @@ class Discretization:
 
     step: Callable[[float, FloatArray, FloatArray], DiscreteSystem]
     """(alpha_z, duration (*batch), dt (*batch)) to the matrices of one step."""
-    forcing_offset: float
-    """Where in the step the forcing term is evaluated, in steps after its start."""
+    forcing_stencil: tuple[tuple[float, float], ...]
+    """What is held over a step: the mean forcing term at places in it, in steps after its start, each with its weight."""
+    noise_offset: float
+    """Where in a step the variance of the forcing term is evaluated, in steps after its start."""
+    noise_variance: Callable[[FloatArray], FloatArray]
+    """From alpha_z dt / duration: variance, but for a factor, of noise held over a step that moves the velocity as far as
+    white noise of a given intensity does. It decides how the variance of the forcing term depends on the control rate."""
 
 
 def spring_matrix(alpha_z: float, duration: FloatArray) -> FloatArray:
@@ -93,7 +110,22 @@ def _rows(entries: list[FloatArray]) -> FloatArray:
     return np.stack(np.broadcast_arrays(*entries), axis=-1)
 
 
+def _exact_noise_variance(stiffness: FloatArray) -> FloatArray:
+    """The integral of the squared velocity response over a step, over the square of its integral."""
+    # Velocity response to an impulse: exp(-y) (1 - y), y = alpha_z t / (2 duration).
+    y = stiffness / 2
+    decay = np.exp(-2 * y)
+    return np.asarray((1 - decay * (1 - 2 * y + 2 * y**2)) / (4 * y**2 * decay))
+
+
 DISCRETIZATIONS = {
-    "exact": Discretization(_exact, forcing_offset=0.5),
-    "semi_implicit_euler": Discretization(_semi_implicit_euler, forcing_offset=0.0),
+    "exact": Discretization(
+        _exact,
+        forcing_stencil=((0.0, -1 / 6), (0.5, 8 / 6), (1.0, -1 / 6)),
+        noise_offset=0.5,
+        noise_variance=_exact_noise_variance,
+    ),
+    "semi_implicit_euler": Discretization(
+        _semi_implicit_euler, forcing_stencil=((0.0, 1.0),), noise_offset=0.0, noise_variance=np.reciprocal
+    ),
 }

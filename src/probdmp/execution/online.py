@@ -10,10 +10,10 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from probdmp.checks import FloatArray, check_array, check_choice, check_number
+from probdmp.checks import FloatArray, check_array, check_choice, check_number, check_seconds
 from probdmp.dmp import Primitive, Task, linear_gaussian_model, step_count
 from probdmp.dmp.phase import phases_at
-from probdmp.execution.trajectory import ACCELERATION, POSITION, VELOCITY
+from probdmp.dmp.transformation_system import ACCELERATION, POSITION, VELOCITY
 from probdmp.gaussian import predict, update
 
 __all__ = ["ExecutionStep", "Judgement", "Monitor", "Observed", "OnlineExecution"]
@@ -44,9 +44,9 @@ class Judgement(Protocol):
     @property
     def failed(self) -> bool: ...
     @property
-    def time(self) -> float | None: ...
+    def time(self) -> float: ...
     @property
-    def phase(self) -> float | None: ...
+    def phase(self) -> float: ...
     @property
     def test_ratio(self) -> float: ...
     @property
@@ -94,6 +94,8 @@ class ExecutionStep:
     """(D,) array, data units: measured minus predicted; NaN where not seen."""
     test_ratio: float
     """Statistic over threshold of the detector, above 1 for an alarm; NaN without a detector."""
+    verdict: Judgement | None
+    """What the detector says so far; None without a detector."""
 
 
 class OnlineExecution:
@@ -111,10 +113,10 @@ class OnlineExecution:
     def __init__(
         self, primitive: Primitive, task: Task, dt: float, detector: Detector | None = None, on_alarm: str = "continue"
     ) -> None:
-        self.primitive, self.task, self.dt = primitive, task, dt
+        self.primitive, self.task, self.dt = primitive, task, check_seconds(dt, "dt")
         self._detector = detector
         self._on_alarm = check_choice(on_alarm, "on_alarm", ALARM_REACTIONS)
-        self._chunk = step_count(float(task.duration), dt) + 1
+        self._chunk = step_count(float(task.duration), self.dt) + 1
         self.reset()
 
     def reset(self) -> None:
@@ -202,6 +204,7 @@ class OnlineExecution:
             contributions=seen.log_likelihood,
             innovations=seen.innovation[:, 0],
             test_ratio=test_ratio,
+            verdict=self.verdict,
         )
 
     def _desired(self) -> FloatArray:
@@ -210,6 +213,7 @@ class OnlineExecution:
             return self._mean
         if self._held is None:
             self._held = self._mean * np.eye(3)[POSITION]
+            self._held.setflags(write=False)
         return self._held
 
     def _load(self, first: int) -> None:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from probdmp.checks import FloatArray
 from probdmp.demonstrations import Demonstration, stack_positions
 from probdmp.dmp import Primitive, Task, linear_gaussian_model, task_for
-from probdmp.errors import InputError
+from probdmp.errors import InputError, InputTypeError
 from probdmp.execution.trajectory import GaussianTrajectory, TrackedTrajectory
 from probdmp.gaussian import FilteredSequence, filter_sequence, smooth_sequence
 
@@ -34,15 +34,13 @@ def task_of_recording(
 
     Parameters
     ----------
-    start : (D,) array, data units; the first row of the recording unless given, as learned where that row is missing.
+    start : (D,) array, data units; the first row of the recording unless given; unknown where that row is missing.
     goal : (D,) array, data units; as learned unless given.
     duration : seconds; the length of the recording unless given.
     start_velocity : (D,) array, data units per second; as learned, with its variance, unless given.
     """
     _check_recordings(primitive, [recording])
-    if start is None:
-        first = recording.positions[0]
-        start = np.where(np.isnan(first), primitive.start, first)
+    start = recording.positions[0] if start is None else start
     return task_for(primitive, start, goal, recording.duration if duration is None else duration, start_velocity)
 
 
@@ -85,6 +83,8 @@ def score_recordings(primitive: Primitive, tasks: Sequence[Task], recordings: Se
 
 def check_tasks(tasks: Sequence[Task], recordings: Sequence[Demonstration]) -> Sequence[Task]:
     """One task for each recording, or an error."""
+    if not isinstance(tasks, list | tuple) or not all(isinstance(task, Task) for task in tasks):
+        raise InputTypeError("tasks as a list of Task", f"{tasks!r:.100}", "task_for(primitive, …) in probdmp.dmp makes them.")
     if len(tasks) != len(recordings):
         raise InputError(f"one task for each of {len(recordings)} recordings", f"{len(tasks)}")
     return tasks
@@ -111,11 +111,13 @@ def _stack_tasks(tasks: Sequence[Task]) -> Task:
 
 
 def _check_recordings(primitive: Primitive, recordings: Sequence[Demonstration]) -> None:
-    """Refuse recordings of other degrees of freedom than the primitive has."""
+    """Refuse recordings of other degrees of freedom, in another order, or in other units than the primitive has."""
     for recording in recordings:
-        if recording.n_dof != primitive.n_dof:
+        if recording.n_dof != primitive.n_dof or (recording.has_names and recording.names != primitive.names):
             raise InputError(
                 f"recordings of {primitive.n_dof} degrees of freedom ({', '.join(primitive.names)})",
                 f"one with {recording.n_dof} ({', '.join(recording.names)})",
-                "Time goes first: (T, D).",
+                "Time goes first: (T, D). Bring the columns into the order that was learned.",
             )
+        if recording.units and primitive.units and recording.units != primitive.units:
+            raise InputError(f"recordings in {primitive.units}", f"one in {recording.units}", "Convert them first.")

@@ -4,7 +4,8 @@ import numpy as np
 
 from probdmp.checks import FloatArray
 from probdmp.dmp import Primitive, Task, linear_gaussian_model, step_count
-from probdmp.execution.trajectory import POSITION, GaussianTrajectory
+from probdmp.dmp.transformation_system import POSITION
+from probdmp.execution.trajectory import GaussianTrajectory
 from probdmp.gaussian import filter_sequence, sample_sequences
 
 __all__ = ["roll_out", "sample_trajectories"]

@@ -1,15 +1,13 @@
 """Trajectories with their uncertainty."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from probdmp.checks import FloatArray
+from probdmp.dmp.transformation_system import ACCELERATION, POSITION, VELOCITY
 
-__all__ = ["ACCELERATION", "POSITION", "VELOCITY", "GaussianTrajectory", "TrackedTrajectory"]
-
-ACCELERATION, VELOCITY, POSITION = 0, 1, 2
-"""Order of the state."""
+__all__ = ["GaussianTrajectory", "TrackedTrajectory"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,6 +24,11 @@ class GaussianTrajectory:
     """(D) names of the degrees of freedom."""
     units: str
     """Unit of the positions, free text."""
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            if isinstance(array := getattr(self, field.name), np.ndarray):
+                array.setflags(write=False)
 
     @property
     def positions(self) -> FloatArray:
@@ -73,3 +76,8 @@ class TrackedTrajectory(GaussianTrajectory):
     """(T, D) array, data units: measured minus predicted; NaN where not seen."""
     innovation_variances: FloatArray
     """(T, D) array, data units squared: variance of the innovations, seen or not."""
+
+    @property
+    def innovation_covariances(self) -> FloatArray:
+        """(T, D, D) array, data units squared: diagonal, since the sensors are independent."""
+        return self.innovation_variances[..., None] * np.eye(len(self.names))

@@ -70,7 +70,7 @@ def write_npz(path: str | os.PathLike[str], demonstrations: Sequence[Demonstrati
             f"{len(checked)} demonstrations with columns {listing(map(repr, columns))}",
         )
     tables = [np.column_stack([d.positions, *(d.channels[name] for name in first.channels)]) for d in checked]
-    arrays = {
+    arrays: dict[str, Any] = {
         "data": np.concatenate(tables),
         "offsets": np.cumsum([0, *map(len, tables)]),
         "labels": _text_array([d.label for d in checked]),
@@ -82,7 +82,7 @@ def write_npz(path: str | os.PathLike[str], demonstrations: Sequence[Demonstrati
     if positions_by_name(columns) != list(first.names):
         arrays["positions"] = _text_array(list(first.names))
     buffer = io.BytesIO()
-    np.savez(buffer, allow_pickle=False, **arrays)
+    np.savez(buffer, **arrays)
     if buffer.tell() > LARGEST_ARCHIVE:
         raise InputError(f"at most {LARGEST_ARCHIVE} bytes of demonstrations", f"{buffer.tell()}", "Write several files.")
     write_atomically(path, buffer.getvalue())

@@ -89,7 +89,7 @@ def check_recordings(arrays: dict[str, NDArray[Any]], name: str) -> Recordings:
 
 def positions_by_name(columns: Iterable[str]) -> list[str]:
     """The columns whose names say that they are positions."""
-    return [column for column in columns if re.fullmatch(r"x|y|z|q\w*", column)]
+    return [column for column in columns if re.fullmatch(r"x|y|z|q.*", column)]
 
 
 def listing(items: Iterable[object], most: int = 40) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 from probdmp.checks import FloatArray
 from probdmp.demonstrations import Demonstration, mean_ranges, noise_stds, smooth_path, stack_positions
 from probdmp.dmp import Configuration, Primitive, Task, demonstrated_tasks, linear_gaussian_model
+from probdmp.dmp.transformation_system import POSITION
 from probdmp.gaussian import filter_sequence
 from probdmp.learning.forcing_targets import forcing_targets, scheme_velocities
 from probdmp.learning.observation_noise import ObservationNoise, estimate_observation_noise
@@ -24,9 +25,9 @@ def fit_primitive(
     demonstrations: Sequence[Demonstration], configuration: Configuration, options: LearningOptions
 ) -> tuple[Primitive, FitReport]:
     """Learn a primitive from K demonstrations, each with its own start, goal, duration and length."""
-    tasks = demonstrated_tasks(demonstrations)
     paths = [smooth_path(d, options.smoothing) for d in demonstrations]
     velocities = [scheme_velocities(p, d.dt, configuration.discretization) for p, d in zip(paths, demonstrations, strict=True)]
+    tasks = demonstrated_tasks(demonstrations)
     targets = [
         forcing_targets(path.positions, v, goal, d.dt, configuration)
         for path, v, goal, d in zip(paths, velocities, tasks.goal, demonstrations, strict=True)
@@ -56,8 +57,10 @@ def _still_primitive(
     """
     first, k, dts = demonstrations[0], len(demonstrations), np.array([d.dt for d in demonstrations])
     phase_velocities = start_velocities * tasks.duration[:, None]
-    start_covariances = np.zeros((first.n_dof, 2, 2))  # the start position is given
-    start_covariances[:, 0, 0] = np.var(phase_velocities, axis=0, ddof=1) if k > 1 else 0.0
+    start_covariances = np.zeros((first.n_dof, 2, 2))
+    if k > 1:
+        start_covariances[:, 0, 0] = np.var(phase_velocities, axis=0, ddof=1)
+        start_covariances[:, 1, 1] = np.var(tasks.start, axis=0, ddof=1)
     ranges = mean_ranges(demonstrations)
     return Primitive(
         configuration=configuration,
@@ -87,7 +90,7 @@ def _observation_noise(
     """R by EM, and the mean squared distance of each demonstration from its rollout, (K, D), data units squared."""
     observed, dts = stack_positions(demonstrations), np.array([d.dt for d in demonstrations])
     model = linear_gaussian_model(primitive, tasks, dts, len(observed))
-    rollouts = filter_sequence(model).filtered.means[..., 2]
+    rollouts = filter_sequence(model).filtered.means[..., POSITION]
     squared_errors = np.nanmean((observed - rollouts) ** 2, axis=0)
     observed[0] = np.nan  # the commanded start is this very sample: it would count as measured without error
     # The sensor alone, or all that the mean movement leaves unexplained: EM begins with whichever is likelier.

@@ -15,7 +15,7 @@ import numpy as np
 from probdmp.checks import FloatArray
 from probdmp.demonstrations import SmoothPath
 from probdmp.dmp import Configuration
-from probdmp.dmp.transformation_system import DISCRETIZATIONS
+from probdmp.dmp.transformation_system import DISCRETIZATIONS, VELOCITY
 
 __all__ = ["forcing_targets", "scheme_velocities"]
 
@@ -46,6 +46,6 @@ def forcing_targets(
     duration = np.asarray((len(positions) - 1) * dt)
     scheme = DISCRETIZATIONS[configuration.discretization]
     system = scheme.step(configuration.alpha_z, duration, np.asarray(dt))
-    _, from_velocity, from_position = system.transition[1]
+    _, from_velocity, from_position = system.transition[VELOCITY]
     free = from_velocity * velocities[:-1] + from_position * positions[:-1]
-    return (velocities[1:] - free) / system.input_vector[1] - configuration.alpha_z**2 / 4 * goal
+    return (velocities[1:] - free) / system.input_vector[VELOCITY] - configuration.stiffness * goal

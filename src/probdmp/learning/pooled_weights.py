@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from probdmp.checks import FloatArray
-from probdmp.dmp import Primitive, Task
+from probdmp.dmp import Configuration, Primitive, Task
 from probdmp.dmp.basis import basis_features
 from probdmp.dmp.phase import phases_at
 from probdmp.dmp.transformation_system import DISCRETIZATIONS
@@ -27,10 +27,9 @@ def pooled_weights(primitive: Primitive, tasks: Task, targets: Sequence[FloatArr
     targets : K arrays (T_k - 1, D) of s f, data units.
     """
     configuration = primitive.configuration
-    offset = DISCRETIZATIONS[configuration.discretization].forcing_offset
-    features = [basis_features(phases_at((np.arange(len(f)) + offset) / len(f), 1.0), configuration.n_basis) for f in targets]
+    features = [_held_features(configuration, len(f)) for f in targets]
     amplitudes = primitive.amplitudes(tasks)
-    resolutions = RESOLUTION * configuration.alpha_z**2 / 4 * primitive.ranges
+    resolutions = RESOLUTION * configuration.stiffness * primitive.ranges
     return [
         regress_weights(
             np.concatenate([s * phi for s, phi in zip(amplitudes[:, d], features, strict=True)]),
@@ -39,3 +38,11 @@ def pooled_weights(primitive: Primitive, tasks: Task, targets: Sequence[FloatArr
         )
         for d in range(primitive.n_dof)
     ]
+
+
+def _held_features(configuration: Configuration, n_transitions: int) -> FloatArray:
+    """What the basis functions hold over each step of a whole movement, (n_transitions, N) array."""
+    stencil = DISCRETIZATIONS[configuration.discretization].forcing_stencil
+    starts = np.arange(n_transitions, dtype=np.float64)
+    held = [w * basis_features(phases_at(starts + place, n_transitions), configuration.n_basis) for place, w in stencil]
+    return np.asarray(sum(held))

@@ -1,18 +1,20 @@
-"""The estimators: scikit-learn manners, no arithmetic."""
+"""One movement: scikit-learn manners, no arithmetic."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from inspect import signature
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from probdmp.checks import FloatArray, check_choice, check_count, check_positive
+from probdmp.checks import FloatArray, check_array, check_choice, check_count, check_seconds
 from probdmp.demonstrations import Demonstration, as_demonstrations
-from probdmp.demonstrations.demonstration import MILLISECONDS_HINT
 from probdmp.detection import FailureDetector
 from probdmp.dmp import PUBLISHED, Configuration, Primitive, Task, task_for
-from probdmp.errors import InputError, ModelFileError, NotFittedError, UnknownLabelError
+from probdmp.errors import InputTypeError, NotFittedError
+from probdmp.estimator.saving import write_learned
 from probdmp.execution import (
     GaussianTrajectory,
     OnlineExecution,
@@ -24,12 +26,12 @@ from probdmp.execution import (
     task_of_recording,
     track_recording,
 )
-from probdmp.io import ModelContents, read_model, write_model
 from probdmp.learning import FitReport, LearningOptions, fit_primitive
 
-__all__ = ["PrimitiveLibrary", "ProbabilisticDMP", "load", "load_detector"]
+__all__ = ["ProbabilisticDMP"]
 
 WEIGHT_UNCERTAINTIES = ("independent",)
+MOST_SAMPLES = 10_000
 
 Recording = Demonstration | ArrayLike
 Recordings = Demonstration | Sequence[Recording] | FloatArray
@@ -90,12 +92,19 @@ class ProbabilisticDMP:
         ----------
         forcing_noise : the paper does not say which; it speaks of a predictive distribution.
         """
-        scheme, scaling = PUBLISHED.discretization, PUBLISHED.scaling
-        return cls(n_basis, forcing_noise=forcing_noise, discretization=scheme, scaling=scaling, alpha_z=PUBLISHED.alpha_z)
+        settings = asdict(PUBLISHED) | {"n_basis": n_basis, "forcing_noise": forcing_noise}
+        return cls(weight_model="pooled", weight_uncertainty="independent", smoothing=0.05, **settings)
 
-    def get_params(self) -> dict[str, Any]:
+    def get_params(self, deep: bool = True) -> dict[str, Any]:
         """The constructor's arguments by name."""
-        return {name: value for name, value in vars(self).items() if not name.endswith("_")}
+        return {name: getattr(self, name) for name in signature(type(self).__init__).parameters if name != "self"}
+
+    def set_params(self, **parameters: Any) -> Self:
+        """Change constructor's arguments by name."""
+        for name, value in parameters.items():
+            check_choice(name, "the name of a parameter", self.get_params())
+            setattr(self, name, value)
+        return self
 
     def __repr__(self) -> str:
         arguments = ", ".join(f"{name}={value!r}" for name, value in self.get_params().items())
@@ -176,9 +185,13 @@ class ProbabilisticDMP:
 
         Parameters
         ----------
+        start : where it starts; unless given it is about where the demonstrations did, and the first observation tells.
         detector : judges the execution while it runs.
         on_alarm : `"continue"` or `"hold"`, what is commanded after an alarm; see `OnlineExecution`.
         """
+        if not isinstance(detector, FailureDetector | None):
+            raise InputTypeError("detector as a FailureDetector", f"{detector!r:.100}")
+        start = np.full(self._learned().n_dof, np.nan) if start is None else start
         task = task_for(self._learned(), start, goal, duration, start_velocity)
         return OnlineExecution(self._learned(), task, self._step(dt), detector, on_alarm)
 
@@ -210,13 +223,30 @@ class ProbabilisticDMP:
         ----------
         sensor_noise : whether positions are as a sensor would record them, or as they are.
         """
-        task, count = task_for(self._learned(), start, goal, duration, start_velocity), check_count(n_samples, "n_samples")
-        rng = np.random.default_rng(random_state)
+        task = task_for(self._learned(), start, goal, duration, start_velocity)
+        count = check_count(n_samples, "n_samples", most=MOST_SAMPLES)
+        try:
+            rng = np.random.default_rng(random_state)
+        except (TypeError, ValueError) as error:
+            raise InputTypeError("random_state as a whole number >= 0 or a Generator", f"{random_state!r:.100}") from error
         return sample_trajectories(self._learned(), task, self._step(dt), count, rng, sensor_noise)
+
+    def with_sensor_noise(self, stds: ArrayLike) -> Self:
+        """The same movement measured by other sensors; a detector has to be fitted to it anew.
+
+        Parameters
+        ----------
+        stds : (D,) array, data units: standard deviation of each position sensor, > 0.
+        """
+        learned = self._learned()
+        variances = check_array(stds, "stds", (learned.n_dof,)) ** 2
+        other = type(self)(**self.get_params())
+        other.primitive_, other.fit_report_ = replace(learned, observation_variances=variances), None
+        return other
 
     def save(self, path: str | Path, detector: FailureDetector | None = None) -> None:
         """Write a model file, atomically, with the detector if given."""
-        PrimitiveLibrary({"": self}).save(path, detector)
+        write_learned(path, {"": (self._learned(), self.get_params())}, detector)
 
     def _learned(self) -> Primitive:
         if not hasattr(self, "primitive_"):
@@ -224,104 +254,7 @@ class ProbabilisticDMP:
         return self.primitive_
 
     def _step(self, dt: float | None) -> float:
-        return self._learned().dt if dt is None else check_positive(dt, "dt", "seconds", MILLISECONDS_HINT)
+        return self._learned().dt if dt is None else check_seconds(dt, "dt")
 
     def _recording(self, observations: Recording, dt: float | None) -> Demonstration:
         return as_demonstrations([observations], self._step(dt))[0]
-
-
-class PrimitiveLibrary(Mapping[str, ProbabilisticDMP]):
-    """Learned movements by label.
-
-    Parameters
-    ----------
-    primitives : learned ProbabilisticDMPs by label.
-    """
-
-    def __init__(self, primitives: Mapping[str, ProbabilisticDMP]) -> None:
-        if not primitives:
-            raise InputError("at least one primitive", "an empty mapping")
-        self._primitives = dict(primitives)
-
-    @classmethod
-    def fit(cls, demonstrations: Mapping[str, Recordings], dt: float | None = None, **parameters: Any) -> Self:
-        """Learn one primitive per label.
-
-        Parameters
-        ----------
-        demonstrations : by label, as for `ProbabilisticDMP.fit`.
-        parameters : constructor arguments of ProbabilisticDMP.
-        """
-        return cls({label: ProbabilisticDMP(**parameters).fit(items, dt) for label, items in demonstrations.items()})
-
-    @classmethod
-    def load(cls, path: str | Path) -> Self:
-        """Read all primitives of a model file."""
-        contents = read_model(path)
-        return cls({label: _restored(contents, label) for label in contents.primitives})
-
-    def save(self, path: str | Path, detector: FailureDetector | None = None) -> None:
-        """Write one model file, atomically, with the detector if given."""
-        contents = ModelContents(
-            primitives={label: p._learned() for label, p in self.items()},
-            settings={label: _plain(p.get_params()) for label, p in self.items()},
-            detector=detector.state() if detector is not None else None,
-        )
-        write_model(path, contents)
-
-    def __getitem__(self, label: str) -> ProbabilisticDMP:
-        if label not in self._primitives:
-            raise UnknownLabelError(f"a label of the library, one of {sorted(self)}", repr(label))
-        return self._primitives[label]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._primitives)
-
-    def __len__(self) -> int:
-        return len(self._primitives)
-
-    def __repr__(self) -> str:
-        return f"<PrimitiveLibrary: {', '.join(map(repr, self))}>"
-
-
-def load(path: str | Path, label: str | None = None) -> ProbabilisticDMP:
-    """Read a primitive from a model file.
-
-    Parameters
-    ----------
-    label : which one, if the file holds several; `PrimitiveLibrary.load` reads them all.
-
-    Raises
-    ------
-    ModelFileError
-        If the file is missing, damaged, or not a model file.
-    """
-    contents = read_model(path)
-    labels = list(contents.primitives)
-    chosen = labels[0] if label is None and len(labels) == 1 else label
-    if chosen not in contents.primitives:
-        raise UnknownLabelError(f"a label of the file, one of {sorted(labels)}", repr(label))
-    return _restored(contents, str(chosen))
-
-
-def load_detector(path: str | Path) -> FailureDetector | None:
-    """Read the detector of a model file; None if it was saved without one."""
-    contents = read_model(path)
-    return None if contents.detector is None else FailureDetector.from_state(contents.detector, contents.primitives)
-
-
-def _plain(parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Numbers of NumPy as numbers of Python, which a model file can hold."""
-    return {name: value.item() if isinstance(value, np.generic) else value for name, value in parameters.items()}
-
-
-def _restored(contents: ModelContents, label: str) -> ProbabilisticDMP:
-    """The estimator as it was after fitting, but for its fit report."""
-    try:
-        estimator = ProbabilisticDMP(**contents.settings[label])
-    except (KeyError, TypeError) as error:
-        raise ModelFileError(
-            f"settings of {label!r} that ProbabilisticDMP takes", str(error), "Learn and save the model again."
-        ) from error
-    estimator.primitive_, estimator.fit_report_ = contents.primitives[label], None
-    return estimator

@@ -1,0 +1,6 @@
+"""What users touch: estimators in scikit-learn manners, without arithmetic."""
+
+from probdmp.estimator.primitive_library import PrimitiveLibrary, load, load_detector
+from probdmp.estimator.probabilistic_dmp import ProbabilisticDMP
+
+__all__ = ["PrimitiveLibrary", "ProbabilisticDMP", "load", "load_detector"]

@@ -1,0 +1,41 @@
+"""What a model file keeps of estimators."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from probdmp.detection import FailureDetector
+from probdmp.dmp import Primitive
+from probdmp.errors import InputError
+from probdmp.io import ModelContents, write_model
+
+__all__ = ["write_learned"]
+
+
+def write_learned(
+    path: str | Path, learned: Mapping[str, tuple[Primitive, Mapping[str, Any]]], detector: FailureDetector | None
+) -> None:
+    """Write a model file, atomically.
+
+    Parameters
+    ----------
+    learned : by label, a primitive and the constructor arguments of its estimator.
+
+    Raises
+    ------
+    InputError
+        If the detector was fitted to other primitives.
+    """
+    primitives = {label: primitive for label, (primitive, _) in learned.items()}
+    state = None if detector is None else detector.state()
+    if state is not None and set(state["minima"]) != {primitive.identity for primitive in primitives.values()}:
+        raise InputError("a detector fitted to these primitives", "one for others", "Fit it to them first.")
+    settings = {label: _plain(parameters) for label, (_, parameters) in learned.items()}
+    write_model(path, ModelContents(primitives, settings, state))
+
+
+def _plain(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Numbers of NumPy as numbers of Python, which a model file can hold."""
+    return {name: value.item() if isinstance(value, np.generic) else value for name, value in parameters.items()}
