@@ -189,7 +189,7 @@ def test_skipped_ticks_are_predicted(primitive, path):
 
 
 @settings(max_examples=20)
-@given(st.lists(st.integers(0, 40), min_size=1, max_size=40))
+@given(st.lists(st.integers(0, 40), min_size=1, max_size=10))
 def test_only_what_is_newer_counts(ticks):
     """Duplicates and late arrivals are dropped and counted; the last answer is repeated."""
     primitive = make_primitive(np.random.default_rng(0), duration=1.0)
@@ -210,6 +210,16 @@ def test_only_what_is_newer_counts(ticks):
         assert messy.n_dropped == n_late
 
 
+def test_a_clock_that_is_set_back_within_the_movement(primitive, path):
+    """Ten late observations are dropped, then their clock is believed; no tick repeats the same command for longer."""
+    execution = OnlineExecution(primitive, task_for(primitive), DT)
+    for k in range(30):
+        execution.step(path[k], k * DT)
+    times = [execution.step(path[30 + k], (5 + k) * DT).time for k in range(15)]
+    assert execution.n_dropped == 10
+    np.testing.assert_allclose(times[10:], (31 + np.arange(5)) * DT)
+
+
 @pytest.mark.parametrize("jump", [1.7e9, 50.0, -50.0, -1.7e9])
 def test_a_clock_that_is_set_during_the_movement(primitive, path, jump):
     jumping, steady = (OnlineExecution(primitive, task_for(primitive), DT) for _ in range(2))
@@ -217,6 +227,16 @@ def test_a_clock_that_is_set_during_the_movement(primitive, path, jump):
     steps = [jumping.step(o, k * DT + (jump if k >= 20 else 0.0)) for k, o in enumerate(path)]
     assert_same_steps(steps, wanted)
     assert jumping.n_dropped == 0
+
+
+def test_a_clock_that_is_set_back_within_the_movement(primitive, path):
+    """Ten late observations are dropped, then their clock is believed; no tick repeats the same command for longer."""
+    execution = OnlineExecution(primitive, task_for(primitive), DT)
+    for k in range(30):
+        execution.step(path[k], k * DT)
+    times = [execution.step(path[30 + k], (5 + k) * DT).time for k in range(15)]
+    assert execution.n_dropped == 10
+    np.testing.assert_allclose(times[10:], (31 + np.arange(5)) * DT)
 
 
 @pytest.mark.parametrize("jump", [1.7e9, -50.0])

@@ -19,6 +19,8 @@ from probdmp.gaussian import predict, update
 __all__ = ["ExecutionStep", "Judgement", "Monitor", "Observed", "OnlineExecution"]
 
 ALARM_REACTIONS = ("continue", "hold")
+MOST_LATE = 10
+"""Observations in a row that may come late before their clock is taken to have been set back."""
 
 
 class Observed(NamedTuple):
@@ -106,8 +108,9 @@ class OnlineExecution:
     `on_alarm="hold"` commands the position that was due at the alarm, at rest, until `reset`.
 
     An observation that comes with a time is used at the tick nearest to it: ticks skipped are predicted, and one that is not
-    newer than the last is dropped (`n_dropped` counts them). A clock that jumps by more than the movement lasts is taken to
-    have been set: the observation is used at the next tick, and later times are understood relative to it.
+    newer than the last is dropped (`n_dropped` counts them). A clock that jumps by more than the movement lasts, or by which many
+    in a row would be dropped, has been set: the observation is used at the next tick, and later times are understood
+    relative to it.
     """
 
     def __init__(
@@ -126,7 +129,7 @@ class OnlineExecution:
         self._mean = model.initial_mean
         self._covariance = model.initial_covariance
         self._monitor = self._detector.monitor(self.primitive) if self._detector is not None else None
-        self._step, self._clock_offset, self.n_dropped = 0, 0.0, 0
+        self._step, self._clock_offset, self.n_dropped, self._n_late = 0, 0.0, 0, 0
         self._held: FloatArray | None = None
         self._last: ExecutionStep | None = None
 
@@ -159,20 +162,22 @@ class OnlineExecution:
             due = self._tick_of(check_number(time, "time as a number of seconds"))
             if due < self._step and self._last is not None:
                 self.n_dropped += 1
+                self._n_late += 1
                 return self._last
             while self._step < due:
                 self._advance(np.full(shape, np.nan))
+        self._n_late = 0
         self._last = self._advance(measured)
         return self._last
 
     def _tick_of(self, time: float) -> int:
         """The tick that an observation belongs to; ticks before `self._step` are over."""
-        tick = (time - self._clock_offset) / self.dt
-        if not abs(tick - self._step) <= self._chunk:  # a jump, or not a number
+        ahead = (time - self._clock_offset) / self.dt - self._step
+        if not abs(ahead) <= self._chunk or self._n_late >= MOST_LATE:  # a jump, or not a number
             if np.isfinite(time):
                 self._clock_offset = time - self._step * self.dt
             return self._step
-        return round(tick)
+        return self._step + round(ahead)
 
     def _advance(self, measured: FloatArray) -> ExecutionStep:
         """One tick: update with what is measured (Alg. 2, lines 5-8), predict the next state (lines 3-4)."""

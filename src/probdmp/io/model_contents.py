@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from types import MappingProxyType
 from typing import Any
 
+from probdmp import __version__
 from probdmp.dmp import Primitive
 from probdmp.errors import InputError, InputTypeError
 from probdmp.io.canonical_json import dump_json
@@ -15,9 +16,7 @@ __all__ = ["ModelContents"]
 
 
 def _provenance_here() -> dict[str, str]:
-    from importlib.metadata import version
-
-    return {"probdmp": version("probdmp"), "created": datetime.now(UTC).isoformat(timespec="seconds")}
+    return {"probdmp": __version__, "created": datetime.now(UTC).isoformat(timespec="seconds")}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,7 +32,7 @@ class ModelContents:
     primitives: Mapping[str, Primitive]
     """By label; a single primitive may have the label ""."""
     settings: Mapping[str, Any]
-    """Constructor arguments of the estimator: numbers, text, booleans, None, and lists and dicts of these."""
+    """By label, constructor arguments of the estimator: numbers, text, booleans, None, and lists and dicts of these."""
     detector: Mapping[str, Any] | None = None
     """State of the detector, of the same kinds."""
     provenance: Mapping[str, str] = field(default_factory=_provenance_here)
