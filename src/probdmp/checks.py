@@ -14,6 +14,7 @@ from probdmp.errors import InputError, InputTypeError
 
 __all__ = [
     "LARGEST_MAGNITUDE",
+    "MILLISECONDS_HINT",
     "SECONDS",
     "FloatArray",
     "check_array",
@@ -34,6 +35,8 @@ LARGEST_MAGNITUDE = 1e100
 
 SECONDS = (1e-9, 1e9)
 """Shortest and longest times: far beyond any movement, and far from where their powers overflow."""
+
+MILLISECONDS_HINT = "A time in milliseconds? Divide it by 1000."
 
 
 def shape_text(shape: Sequence[int | str | None]) -> str:
@@ -116,10 +119,9 @@ def check_positive(value: object, name: str, unit: str = "", hint: str = "") -> 
 def check_seconds(value: object, name: str) -> float:
     """A time > 0 of a size that a movement can have."""
     shortest, longest = SECONDS
-    hint = "A time in milliseconds? Divide it by 1000."
-    number = check_positive(value, name, "seconds", hint)
+    number = check_positive(value, name, "seconds", MILLISECONDS_HINT)
     if not shortest <= number <= longest:
-        raise InputError(f"{name} from {shortest:g} to {longest:g} seconds", repr(value), hint)
+        raise InputError(f"{name} from {shortest:g} to {longest:g} seconds", repr(value), MILLISECONDS_HINT)
     return number
 
 

@@ -17,8 +17,6 @@ __all__ = ["save_arrays", "trajectory_arrays", "trajectory_table", "with_unit"]
 ROWS = 12
 DOFS_PER_TABLE = 4
 """As many as 80 columns hold."""
-HALF_BAND = 1.96
-"""Standard deviations on either side of the mean that hold 95 % of a Gaussian."""
 ARRAYS = (
     *("times", "positions", "velocities", "accelerations", "position_stds", "velocity_stds", "acceleration_stds"),
     *("log_likelihoods", "contributions", "innovations", "innovation_variances"),
@@ -46,6 +44,8 @@ def save_arrays(path: Path, arrays: Mapping[str, Any]) -> None:
 def trajectory_table(trajectory: "GaussianTrajectory") -> None:
     """Print a few rows, evenly chosen: positions with their 95 % bands and, if tracked, log-likelihoods."""
     import numpy as np
+
+    from probdmp.execution.trajectory import HALF_BAND
 
     n_steps, names = len(trajectory.times), trajectory.names
     rows = np.unique(np.linspace(0, n_steps - 1, min(ROWS, n_steps)).round().astype(int))

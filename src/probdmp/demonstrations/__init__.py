@@ -1,6 +1,6 @@
 """Recorded movement as checked data, the built-in letters, and faults to inject."""
 
-from probdmp.demonstrations.demonstration import Demonstration, as_demonstrations, stack_positions
+from probdmp.demonstrations.demonstration import Demonstration, Recording, Recordings, as_demonstrations, stack_positions
 from probdmp.demonstrations.extent import mean_ranges
 from probdmp.demonstrations.faults import FAULTS, hold
 from probdmp.demonstrations.letters import LETTERS, WriterVariation, synthetic_letters
@@ -11,6 +11,8 @@ __all__ = [
     "FAULTS",
     "LETTERS",
     "Demonstration",
+    "Recording",
+    "Recordings",
     "SmoothPath",
     "WriterVariation",
     "as_demonstrations",

@@ -11,14 +11,20 @@ from numpy.typing import ArrayLike
 from probdmp.checks import FloatArray, check_array, check_seconds, frozen, shape_text
 from probdmp.errors import InputError, InputTypeError
 
-__all__ = ["LONGEST_RECORDING", "SHORTEST_RECORDING", "Demonstration", "as_demonstrations", "stack_positions"]
+__all__ = [
+    "LONGEST_RECORDING",
+    "SHORTEST_RECORDING",
+    "Demonstration",
+    "Recording",
+    "Recordings",
+    "as_demonstrations",
+    "stack_positions",
+]
 
 SHORTEST_RECORDING = 3
 """Samples; acceleration needs three."""
 LONGEST_RECORDING = 100_000
 """Samples, 100 s at 1 kHz; more is refused rather than computed for minutes."""
-
-MILLISECONDS_HINT = "A time in milliseconds? Divide it by 1000."
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,13 +116,17 @@ class Demonstration:
         return (self.n_samples - 1) * self.dt
 
 
+Recording = Demonstration | ArrayLike
+"""What a recorded movement may be given as: a demonstration, or a bare (T, D) array."""
+Recordings = Demonstration | Sequence[Recording] | FloatArray
+"""Several of them: in a sequence, or as one (K, T, D) array."""
+
+
 def _default_names(n_dof: int) -> tuple[str, ...]:
     return tuple(f"dof{i}" for i in range(n_dof))
 
 
-def as_demonstrations(
-    data: Demonstration | Sequence[Demonstration | ArrayLike] | FloatArray, dt: float | None = None
-) -> list[Demonstration]:
+def as_demonstrations(data: Recordings, dt: float | None = None) -> list[Demonstration]:
     """Demonstrations from whatever a user has: demonstrations, (T, D) arrays with `dt`, or one (K, T, D) array.
 
     Parameters
@@ -156,7 +166,7 @@ def as_demonstrations(
     return demonstrations
 
 
-def _as_demonstration(item: Demonstration | ArrayLike, k: int, dt: float | None) -> Demonstration:
+def _as_demonstration(item: Recording, k: int, dt: float | None) -> Demonstration:
     if isinstance(item, Demonstration):
         return item
     if dt is None:

@@ -15,8 +15,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from probdmp.checks import FloatArray, check_array, check_choice, check_count, check_seconds
-from probdmp.demonstrations.demonstration import MILLISECONDS_HINT, Demonstration
+from probdmp.checks import MILLISECONDS_HINT, FloatArray, check_array, check_choice, check_count, check_seconds
+from probdmp.demonstrations.demonstration import Demonstration
 from probdmp.errors import InputError, InputTypeError
 
 __all__ = ["LETTERS", "WriterVariation", "synthetic_letters"]

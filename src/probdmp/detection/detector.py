@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Protocol, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from probdmp.checks import FloatArray, check_array, check_choice
-from probdmp.demonstrations import Demonstration, as_demonstrations
+from probdmp.checks import check_array, check_choice
+from probdmp.demonstrations import Demonstration, Recordings, as_demonstrations
 from probdmp.detection.monitoring import LikelihoodMonitor, LikelihoodStatistic, replay
 from probdmp.detection.statistics import LIKELIHOODS
 from probdmp.detection.thresholds import PaperThreshold
@@ -19,8 +19,6 @@ from probdmp.execution import check_tasks, task_of_recording
 __all__ = ["FailureDetector"]
 
 RULES = ("paper",)
-
-Recordings = Demonstration | Sequence[Demonstration | ArrayLike] | FloatArray
 
 
 class Learned(Protocol):

@@ -5,9 +5,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Self
 
+from probdmp.demonstrations import Recordings
 from probdmp.detection import FailureDetector
 from probdmp.errors import InputError, InputTypeError, ModelFileError, UnknownLabelError
-from probdmp.estimator.probabilistic_dmp import ProbabilisticDMP, Recordings
+from probdmp.estimator.probabilistic_dmp import ProbabilisticDMP
 from probdmp.estimator.saving import write_learned
 from probdmp.io import ModelContents, read_model
 

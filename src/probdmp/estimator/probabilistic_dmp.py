@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from probdmp.checks import FloatArray, check_array, check_choice, check_count, check_seconds
-from probdmp.demonstrations import Demonstration, as_demonstrations
+from probdmp.demonstrations import Demonstration, Recording, Recordings, as_demonstrations
 from probdmp.detection import FailureDetector
 from probdmp.dmp import PUBLISHED, Configuration, Primitive, Task, task_for
 from probdmp.errors import InputTypeError, NotFittedError
@@ -32,9 +32,6 @@ __all__ = ["ProbabilisticDMP"]
 
 WEIGHT_UNCERTAINTIES = ("independent",)
 MOST_SAMPLES = 10_000
-
-Recording = Demonstration | ArrayLike
-Recordings = Demonstration | Sequence[Recording] | FloatArray
 
 
 class ProbabilisticDMP:

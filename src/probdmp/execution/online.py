@@ -108,8 +108,8 @@ class OnlineExecution:
     `on_alarm="hold"` commands the position that was due at the alarm, at rest, until `reset`.
 
     An observation that comes with a time is used at the tick nearest to it: ticks skipped are predicted, and one that is not
-    newer than the last is dropped (`n_dropped` counts them). A clock that jumps by more than the movement lasts, or by which many
-    in a row would be dropped, has been set: the observation is used at the next tick, and later times are understood
+    newer than the last is dropped (`n_dropped` counts them). A clock that jumps by more than the movement lasts, or by which
+    many in a row would be dropped, has been set: the observation is used at the next tick, and later times are understood
     relative to it.
     """
 

@@ -7,7 +7,10 @@ import numpy as np
 from probdmp.checks import FloatArray
 from probdmp.dmp.transformation_system import ACCELERATION, POSITION, VELOCITY
 
-__all__ = ["GaussianTrajectory", "TrackedTrajectory"]
+__all__ = ["HALF_BAND", "GaussianTrajectory", "TrackedTrajectory"]
+
+HALF_BAND = 1.96
+"""Standard deviations on either side of the mean that hold 95 % of a Gaussian."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -4,6 +4,7 @@ from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
 
 from probdmp.errors import MissingExtraError
+from probdmp.execution.trajectory import HALF_BAND
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -51,7 +52,8 @@ def figure_style() -> AbstractContextManager[None]:
 
 
 def band(ax: "Axes", times: Any, means: Any, stds: Any, label: str | None = None) -> "Axes":
-    """A mean with its 95 % band, 1.96 standard deviations to either side."""
-    ax.fill_between(times, means - 1.96 * stds, means + 1.96 * stds, color=BAND, alpha=0.6, linewidth=0, label=label)
+    """A mean with its 95 % band."""
+    half = HALF_BAND * stds
+    ax.fill_between(times, means - half, means + half, color=BAND, alpha=0.6, linewidth=0, label=label)
     ax.plot(times, means, color=MEAN)
     return ax
