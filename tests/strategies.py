@@ -139,8 +139,8 @@ def primitives(draw, **changes):
 
 
 def dmp_system(rng, n_dof=2, n_steps=40, **changes):
-    """The linear-Gaussian system of a random primitive that carries out its own task in `n_steps` states."""
+    """The linear-Gaussian system of a random primitive on its own way, from an uncertain start, in `n_steps` states."""
     primitive = make_primitive(rng, n_dof, **changes)
     dt = primitive.duration / (n_steps - 1)
     assert step_count(primitive.duration, dt) == n_steps
-    return linear_gaussian_model(primitive, task_for(primitive), dt, n_steps)
+    return linear_gaussian_model(primitive, task_for(primitive, np.full(n_dof, np.nan)), dt, n_steps)

@@ -199,7 +199,11 @@ def calibration(models, which, recordings, dt):
 
 
 def lists_of_tasks(models, letters, start, goal, duration, velocity, count):
-    tasks = [Task(start, goal, duration, velocity)] * count
+    try:
+        tasks = [Task(start, goal, duration, velocity)] * count
+    except ProbDMPError as error:
+        assert isinstance(error, ValueError | TypeError)
+        return
     refuses_or_works(lambda: models[0].score_samples(letters[:2], tasks=tasks))
     refuses_or_works(lambda: FailureDetector().fit(models[0], letters[:2], tasks=tasks))
 
@@ -387,13 +391,41 @@ def test_one_task_for_each_execution(models, detectors, letters, n_tasks):
 
 @pytest.mark.parametrize(
     ("name", "bad"),
-    [(name, bad) for name in ("start", "goal", "duration") for bad in (np.nan, np.inf)] + [("start_velocity", np.inf)],
+    [(name, bad) for name in ("goal", "duration") for bad in (np.nan, np.inf)]
+    + [("start", np.inf), ("start_velocity", np.inf)],
 )
-def test_tasks_made_by_hand_are_checked(models, letters, name, bad):
-    good = {"start": np.zeros(2), "goal": np.ones(2), "duration": np.array(1.0)}
-    task = dataclasses.replace(Task(**good), **{name: np.full(() if name == "duration" else 2, bad)})
+def test_tasks_made_by_hand_are_checked(name, bad):
+    task = Task(np.zeros(2), np.ones(2), np.array(1.0))
     with pytest.raises(InputError, match=f"Expected .*{name}.*, got"):
+        dataclasses.replace(task, **{name: np.full(() if name == "duration" else 2, bad)})
+
+
+def test_tasks_of_other_degrees_of_freedom(models, letters):
+    task = Task(np.zeros(3), np.ones(3), np.array(1.0))
+    with pytest.raises(ProbDMPError, match=r"Expected .*"):
         models[0].score_samples(letters[:1], tasks=[task])
+
+
+@pytest.mark.parametrize("start", [[np.nan, np.nan], [np.nan, 1.0]])
+@pytest.mark.parametrize("velocity", [None, [np.nan, 0.0]])
+def test_starts_that_are_not_known(models, letters, start, velocity):
+    for p in models:
+        task = Task(start, np.ones(2), np.array(1.0), velocity)
+        assert_finite(p.score_samples(letters[:1], tasks=[task]))
+        assert_finite(p.rollout(start, start_velocity=velocity))
+        assert_finite(p.sample(2, start, start_velocity=velocity, random_state=0))
+        assert_finite(p.execute(start, start_velocity=velocity).step())
+
+
+@pytest.mark.parametrize("stiffness", [41.0, 400.0, 900.0])
+def test_steps_too_coarse_for_the_spring(letters, stiffness):
+    """Numbers of the exact scheme are sound for alpha_z dt / duration up to 40."""
+    p = ProbabilisticDMP(5, alpha_z=1e3).fit(letters)
+    dt = p.primitive_.duration * stiffness / 1e3
+    for run in (p.rollout, p.sample, p.execute):
+        with pytest.raises(InputError, match=r"Expected alpha_z dt / duration <= 40"):
+            run(dt=dt)
+    assert_finite(p.rollout(dt=dt * 39 / stiffness))
 
 
 def test_a_recording_beyond_the_size_limit(models):

@@ -2,7 +2,7 @@
 
 import inspect
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -23,6 +23,7 @@ from probdmp import (
 from probdmp.dmp import task_for
 from probdmp.errors import InputError, InputTypeError, ModelFileError, NotFittedError
 from probdmp.execution import roll_out, score_recordings, task_of_recording, track_recording
+from probdmp.io import ModelContents, write_model
 
 DEFAULTS = {
     "n_basis": 30, "weight_model": "pooled", "weight_uncertainty": "independent", "forcing_noise": "predictive",
@@ -122,6 +123,30 @@ def test_fit_checks_the_arguments(letters, argument, value, error):
         ProbabilisticDMP(**{argument: value}).fit(letters["s"])
 
 
+@pytest.mark.parametrize("alpha_z", [0.9e-3, 1.1e4])
+def test_springs_that_are_too_soft_or_too_stiff(letters, alpha_z):
+    with pytest.raises(InputError, match=r"Expected alpha_z from 0\.001 to 10000"):
+        ProbabilisticDMP(alpha_z=alpha_z).fit(letters["s"])
+
+
+def test_parameters_by_name():
+    p = ProbabilisticDMP(12)
+    assert p.get_params(deep=False) == p.get_params(deep=True) == p.get_params()
+    assert p.set_params(n_basis=7, scaling="paper") is p
+    assert p.get_params() == DEFAULTS | {"n_basis": 7, "scaling": "paper"}
+    assert p.set_params() is p
+    with pytest.raises(InputError, match=r"Expected the name of a parameter to be one of 'n_basis'.*, got 'basis'"):
+        p.set_params(basis=3)
+    assert not hasattr(p, "basis")
+
+
+def test_demonstrations_must_agree_in_names_and_units(letters):
+    first, second, *_ = letters["s"]
+    for change in ({"names": first.names[::-1]}, {"units": "furlong"}):
+        with pytest.raises(InputError, match=r"the same degrees of freedom .* in the same units"):
+            ProbabilisticDMP(5).fit([first, replace(second, **change)])
+
+
 def test_repr_can_be_pasted():
     p = ProbabilisticDMP(12, scaling="paper")
     again = eval(repr(p))
@@ -197,6 +222,70 @@ def test_execute_with_a_detector(learned, letters):
     assert e.failed
     assert step.test_ratio > 1
     np.testing.assert_array_equal(step.velocity, 0)
+
+
+def test_execute_without_a_start_knows_what_the_demonstrations_knew(learned, letters):
+    """Somewhere about their mean, which the first observation tells; a rollout is from the mean itself."""
+    unknown = learned.execute()
+    assert np.isnan(unknown.task.start).all()
+    assert unknown.task.start_velocity is None
+    np.testing.assert_array_equal(learned.rollout().position_stds[0], 0)
+    seen = learned.primitive_.start + np.sqrt(learned.primitive_.start_covariances[:, 1, 1])
+    known = learned.execute(learned.primitive_.start)
+    assert unknown.step(seen).log_likelihood != known.step(seen).log_likelihood
+    np.testing.assert_array_equal(known.task.start, learned.primitive_.start)
+    partly = learned.execute([np.nan, 1.0])
+    np.testing.assert_array_equal(partly.task.start, [np.nan, 1.0])
+
+
+def test_a_step_has_the_verdict_so_far(learned, letters):
+    detector = FailureDetector().fit(learned, letters["s"])
+    e = learned.execute(detector=detector)
+    assert (e.verdict.failed, e.verdict.test_ratio) == (False, 0.0)
+    failed = [e.step([1e5 * t, 0.0]).verdict.failed for t in range(3)]
+    assert failed[-1]
+    assert e.step().verdict is e.verdict
+    assert learned.execute().step().verdict is None
+
+
+def test_what_is_frozen_hands_out_read_only_arrays(learned, letters):
+    detector = FailureDetector().fit(learned, letters["s"])
+    e = learned.execute(detector=detector)
+    frozen = (
+        *(learned.primitive_, learned.fit_report_, letters["s"][0], learned.rollout(), learned.track(letters["s"][0])),
+        *(e.step(letters["s"][0].positions[0]), e.verdict, detector.verdicts(letters["s"])[0], e.task),
+    )
+    writeable = [
+        f"{type(value).__name__}.{field.name}"
+        for value in frozen
+        for field in fields(value)
+        if isinstance(array := getattr(value, field.name), np.ndarray) and array.flags.writeable
+    ]
+    assert writeable == []
+
+
+def test_other_sensors(learned, letters):
+    other = learned.with_sensor_noise([0.5, 2.0])
+    assert type(other) is ProbabilisticDMP
+    assert other.get_params() == learned.get_params()
+    np.testing.assert_array_equal(other.primitive_.observation_variances, [0.25, 4.0])
+    assert other.fit_report_ is None
+    assert_same_trajectory(other.rollout(), learned.rollout())  # the same movement
+    assert np.any(other.track(letters["s"][0]).means != learned.track(letters["s"][0]).means)
+    with pytest.raises(InputError, match="a primitive that this detector was fitted to"):
+        other.execute(detector=FailureDetector().fit(learned, letters["s"]))
+
+
+@pytest.mark.parametrize(
+    ("stds", "error"),
+    [
+        ([0.1], InputError), (0.1, InputError), ([0.1, 0.0], InputError), ([0.1, -0.1], InputError),
+        ([0.1, np.nan], InputError), ([0.1, np.inf], InputError), (["a", "b"], InputTypeError), (None, InputTypeError),
+    ],
+)  # fmt: skip
+def test_sensors_that_cannot_be(learned, stds, error):
+    with pytest.raises(error, match="Expected"):
+        learned.with_sensor_noise(stds)
 
 
 def test_score_samples_is_the_sum_of_the_tracks(learned, letters):
@@ -283,6 +372,32 @@ def test_a_library_keeps_its_labels_in_a_file(library, letters, tmp_path):
         load(path)
     with pytest.raises(InputError, match=r"a label of the file, one of \['s', 'v'\], got 'z'"):
         load(path, "z")
+
+
+def test_a_detector_of_other_primitives_is_not_saved(learned, library, letters, tmp_path):
+    foreign = FailureDetector().fit(library["s"], letters["s"])
+    both = FailureDetector().fit(library, letters)
+    for save in (
+        lambda path: learned.save(path, foreign),
+        lambda path: library.save(path, foreign),
+        lambda path: library["s"].save(path, both),
+    ):
+        with pytest.raises(InputError, match="a detector fitted to these primitives, got one for others"):
+            save(tmp_path / "s.probdmp")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [{"rule": "none"}, {"minima": {"": 1.0}}, {"minima": {}}, {"minima": None}, {"minima": []}, {"surplus": 1}, {"rule": 3}],
+    ids=repr,
+)
+def test_a_damaged_detector_in_a_file(learned, letters, tmp_path, damage):
+    state = FailureDetector().fit(learned, letters["s"]).state() | damage
+    write_model(tmp_path / "s.probdmp", ModelContents({"": learned.primitive_}, {"": learned.get_params()}, state))
+    with pytest.raises(ModelFileError, match=r"Expected .* in .*s\.probdmp.* Fit the detector and save the model again"):
+        load_detector(tmp_path / "s.probdmp")
+    assert load(tmp_path / "s.probdmp").primitive_.identity == learned.primitive_.identity
 
 
 def test_files_that_are_not_there(tmp_path):

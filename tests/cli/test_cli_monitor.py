@@ -2,17 +2,18 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from probdmp import PrimitiveLibrary, load_detector
-from probdmp.execution import task_of_recording
+from probdmp import PrimitiveLibrary, load_detector, write_demonstrations
+from probdmp.dmp import task_for
 
 
 def stream_of(recording, **task):
     """A recording as JSON lines, NaN as null."""
-    lines = [{"task": {"label": recording.label, "dt": recording.dt, "duration": recording.duration, **task}}]
+    lines = [{"task": {"label": recording.label, "dt": recording.dt, **task}}]
     lines += [{"position": [None if np.isnan(p) else p for p in row]} for row in recording.positions.tolist()]
     return "".join(json.dumps(line) + "\n" for line in lines)
 
@@ -55,7 +56,7 @@ def test_the_label_chooses_recordings(folder, run_json):
 def test_the_task_is_told(folder, run_json, blocked):
     document = run_json("monitor", folder / "letters.probdmp", folder / "blocked.npz", "--goal", "50,50", exit_code=4)
     library = PrimitiveLibrary.load(folder / "letters.probdmp")
-    tasks = [task_of_recording(library[d.label].primitive_, d, goal=[50, 50]) for d in blocked]
+    tasks = [task_for(library[d.label].primitive_, d.positions[0], [50, 50]) for d in blocked]  # in the learned time
     verdicts = load_detector(folder / "letters.probdmp").verdicts(blocked, tasks=tasks)
     assert [e["test_ratio"] for e in document["executions"]] == [v.test_ratio for v in verdicts]
 
@@ -78,9 +79,26 @@ def test_json_lines_give_the_verdict_of_the_file(k, folder, run, run_json, block
     assert decisive == pytest.approx(file["test_ratio"], rel=1e-9, abs=1e-9)
 
 
+def test_json_lines_without_a_task_give_the_verdict_of_the_file(folder, run, run_json, letters, tmp_path):
+    """Neither is told anything: start as first seen, goal and duration as learned; also where the first row is missing."""
+    for k, positions in enumerate((letters[0].positions, letters[1].positions[3:], letters[2].positions)):
+        positions = np.array(positions)
+        if k == 2:
+            positions[0, 1] = np.nan
+        recording = replace(letters[k], positions=positions)
+        write_demonstrations(tmp_path / "one.npz", [recording])
+        text = stream_of(recording).split("\n", 1)[1]
+        steps = answers(run("monitor", folder / "c.probdmp", "-", text=text))
+        (file,) = json.loads(run("monitor", folder / "c.probdmp", tmp_path / "one.npz", "--json").stdout)["executions"]
+        assert steps[-1]["failed"] is file["failed"]
+        assert steps[file["step"]]["test_ratio"] == pytest.approx(file["test_ratio"], rel=1e-9, abs=1e-9)
+        ratios = [step["test_ratio"] for step in steps]
+        assert file["test_ratio"] == pytest.approx(ratios[file["step"]] if file["failed"] else max(ratios), rel=1e-9, abs=1e-9)
+
+
 def test_an_answer_per_tick_is_that_of_the_execution(folder, run, blocked):
     recording = blocked[1]
-    result = run("monitor", folder / "letters.probdmp", "-", text=stream_of(recording))
+    result = run("monitor", folder / "letters.probdmp", "-", text=stream_of(recording, duration=recording.duration))
     library, detector = PrimitiveLibrary.load(folder / "letters.probdmp"), load_detector(folder / "letters.probdmp")
     execution = library["c"].execute(
         start=recording.positions[0], duration=recording.duration, dt=recording.dt, detector=detector
@@ -96,7 +114,7 @@ def test_an_answer_per_tick_is_that_of_the_execution(folder, run, blocked):
 
 def test_options_stand_in_for_the_task(folder, run, blocked):
     recording = blocked[1]
-    told = stream_of(recording, goal=[1, 2])
+    told = stream_of(recording, goal=[1, 2], duration=recording.duration)
     untold = told[told.index("\n") + 1 :]
     options = ("--label", "c", "--goal", "1,2", "--dt", recording.dt, "--duration", recording.duration)
     from_options = run("monitor", folder / "letters.probdmp", "-", *options, text=untold)

@@ -225,6 +225,18 @@ def test_demonstrations_keep_their_own_dt():
             InputError,
             r"same degrees of freedom \('dof0', 'dof1'\).* in demonstration 1",
         ),
+        (
+            [Demonstration(POSITIONS, 0.1, names=("x", "y")), Demonstration(POSITIONS, 0.1, names=("y", "x"))],
+            None,
+            InputError,
+            r"same degrees of freedom \('x', 'y'\).*, got \('y', 'x'\).* in demonstration 1",
+        ),
+        (
+            [Demonstration(POSITIONS, 0.1, units="m"), Demonstration(POSITIONS, 0.1, units="mm")],
+            None,
+            InputError,
+            r"in the same units 'm', got .* in 'mm' in demonstration 1",
+        ),
         ([POSITIONS, POSITIONS[0]], 0.1, InputError, r"demonstration 1 of shape \(T, D\), got \(2,\)"),
         ([POSITIONS, "b"], 0.1, InputTypeError, "demonstration 1 as real numbers"),
     ],

@@ -32,6 +32,19 @@ def test_straight_lines_stay_straight_under_jitter(seed, dt):
     assert times[-1] - dt < times[0] + demo.duration <= times[-1] * (1 + 1e-9)
 
 
+@given(seeds, st.integers(3, 200), st.floats(2e-3, 0.5), st.sampled_from([0.0, 1.5e9, 1.9e9]))
+def test_the_last_sample_is_kept(seed, n_samples, dt, epoch):
+    """Whatever the jitter: dt is that near the median spacing of which the recording is a multiple. Also for Unix times."""
+    rng = np.random.default_rng(seed)
+    times = epoch + np.cumsum(rng.uniform(0.8, 1.2, n_samples)) * dt
+    positions = rng.standard_normal((n_samples, 2))
+    demo = demonstration_from_times(times, positions)
+    assert demo.duration == pytest.approx(times[-1] - times[0], rel=1e-9)
+    np.testing.assert_allclose(demo.positions[[0, -1]], positions[[0, -1]], atol=1e-6)
+    median = np.median(np.diff(times))
+    assert abs(demo.dt / median - 1) <= 0.5 / (demo.n_samples - 1) + 0.25 / (demo.n_samples - 1) ** 2 + 1e-9
+
+
 def test_dt_is_the_median_spacing_unless_given():
     times = np.array([0.0, 0.1, 0.2, 0.9, 1.0, 1.1])
     assert demonstration_from_times(times, np.zeros((6, 1))).dt == pytest.approx(0.1)

@@ -95,6 +95,13 @@ def test_times_are_positive(primitive, name, bad):
         replace(primitive, **{name: bad})
 
 
+@pytest.mark.parametrize("name", ["duration", "dt"])
+@pytest.mark.parametrize("bad", [0.9e-9, 1.1e9])
+def test_times_are_those_of_a_movement(primitive, name, bad):
+    with pytest.raises(InputError, match=rf"Expected {name} from 1e-09 to 1e\+09 seconds, got"):
+        replace(primitive, **{name: bad})
+
+
 @pytest.mark.parametrize(
     ("changes", "match"),
     [
@@ -118,6 +125,8 @@ def test_other_fields(primitive, changes, match):
         ({"n_basis": True}, "n_basis as a whole number"),
         ({"alpha_z": 0.0}, "alpha_z > 0, got 0"),
         ({"alpha_z": np.nan}, "alpha_z > 0, got nan"),
+        ({"alpha_z": 0.9e-3}, r"alpha_z from 0\.001 to 10000, got 0\.0009"),
+        ({"alpha_z": 1.1e4}, r"alpha_z from 0\.001 to 10000, got 11000"),
         ({"alpha_z": "25"}, "alpha_z > 0, one number, got '25'"),
         ({"discretization": "euler"}, "discretization to be one of 'exact', 'semi_implicit_euler', got 'euler'"),
         ({"scaling": None}, "scaling to be one of 'none', 'paper', got None"),
@@ -193,6 +202,8 @@ def test_paper_scaling_is_displacement_over_learned_displacement(primitive):
     task = task_for(scaled, [1.0, 2.0], [3.0, 1.0])
     np.testing.assert_allclose(scaled.amplitudes(task), [2.0, -1.0] / scaled.goal_displacements)
     np.testing.assert_allclose(scaled.amplitudes(task_for(scaled)), 1.0)
+    unknown, mean = (task_for(scaled, [1.0, start], [3.0, 1.0]) for start in (np.nan, scaled.start[1]))
+    np.testing.assert_array_equal(scaled.amplitudes(unknown), scaled.amplitudes(mean))
 
 
 @pytest.mark.parametrize("sign", [-1, 1])

@@ -103,10 +103,56 @@ def test_one_unstable_member_of_a_batch_is_enough():
 
 
 def test_exact_is_stable_at_any_step():
-    for dt in (0.1, 1.0, 10.0, 1e3):
+    for dt in (0.1, 0.5, 1.0, 1.59):  # alpha_z dt / duration up to 40, the most that is allowed
         a, b = step_of("exact", 25.0, 1.0, dt)
         assert np.abs(np.linalg.eigvals(a)).max() < 1
         np.testing.assert_allclose((a @ [0, 0, 1] + b * 25**2 / 4)[2], 1, rtol=1e-12)
+
+
+# --- what is held over a step -----------------------------------------------------------------------------------------
+
+
+def test_stencils():
+    assert DISCRETIZATIONS["semi_implicit_euler"].forcing_stencil == ((0.0, 1.0),)
+    places, weights = zip(*DISCRETIZATIONS["exact"].forcing_stencil, strict=True)
+    assert places == (0.0, 0.5, 1.0)
+    np.testing.assert_allclose(weights, [-1 / 6, 8 / 6, -1 / 6], rtol=1e-15)
+    assert [DISCRETIZATIONS[name].noise_offset for name in ("exact", "semi_implicit_euler")] == [0.5, 0.0]
+
+
+@pytest.mark.parametrize("stencil", ["own", "middle alone"])
+def test_the_exact_scheme_follows_a_wave_the_closer_the_smaller_its_step(stencil):
+    """Against the steady answer of p'' = a1 p' + a0 p + tau^2 u to u = cos(w t): an eighth at half the step, or only a quarter."""
+    alpha_z, duration, w = 25.0, 1.3, 17.0
+    wanted = duration**-2 / (-(w**2) + 1j * w * alpha_z / duration + alpha_z**2 / 4 / duration**2)
+    places = DISCRETIZATIONS["exact"].forcing_stencil if stencil == "own" else ((0.5, 1.0),)
+    errors = []
+    for dt in (0.02, 0.01):
+        a, b = step_of("exact", alpha_z, duration, dt)
+        held = sum(weight * np.exp(1j * w * dt * place) for place, weight in places)
+        state = np.linalg.solve(np.exp(1j * w * dt) * np.eye(3) - a, b * held)
+        errors.append(abs(state[2] - wanted) / abs(wanted))
+    assert errors[0] < (2e-3 if stencil == "own" else 1e-2)
+    assert errors[0] / errors[1] > 7 if stencil == "own" else 3.5 < errors[0] / errors[1] < 4.5
+
+
+@given(st.floats(1e-3, 40.0))
+def test_noise_held_over_a_step_moves_the_velocity_as_far_as_white_noise(stiffness):
+    """Variance of the held noise times (integral of the response)^2 is its intensity times the integral of the response^2."""
+    y = stiffness / 2  # pole times step; the velocity answers an impulse by exp(-t) (1 - t)
+    t, weights = np.polynomial.legendre.leggauss(60)
+    t, weights = (t + 1) * y / 2, weights * y / 2
+    response = np.exp(-t) * (1 - t)
+    wanted = weights @ response**2 / (y * np.exp(-y)) ** 2
+    assert weights @ response == pytest.approx(y * np.exp(-y), rel=1e-6, abs=1e-12)
+    assert DISCRETIZATIONS["exact"].noise_variance(np.array(stiffness)) == pytest.approx(wanted, rel=1e-6)
+
+
+def test_noise_of_euler_is_inverse_to_the_step():
+    variance = DISCRETIZATIONS["semi_implicit_euler"].noise_variance
+    np.testing.assert_allclose(variance(np.array([0.1, 0.2, 1.0])) * [0.1, 0.2, 1.0], variance(np.array(1.0)), rtol=1e-14)
+    exact = DISCRETIZATIONS["exact"].noise_variance  # so is that of the exact scheme at small steps
+    np.testing.assert_allclose(exact(np.array([1e-4, 1e-3])) * [1e-4, 1e-3], 2.0, rtol=1e-3)
 
 
 @pytest.mark.parametrize("scheme", DISCRETIZATIONS)

@@ -325,6 +325,45 @@ def test_the_detector_sees_every_tick_once(primitive, path):
     assert last.test_ratio == 5 / 1000
 
 
+def test_the_detector_sees_the_variance_of_every_innovation(primitive, path):
+    """Also of those that were not seen."""
+    detector, task = AlarmAt(1000), task_for(primitive)
+    execution = OnlineExecution(primitive, task, DT, detector)
+    gaps = np.array(path[:6])
+    gaps[2:4, 0] = np.nan
+    for o in gaps:
+        execution.step(o)
+    padded = np.concatenate([gaps, np.full((1, primitive.n_dof), np.nan)])
+    forward = filter_sequence(linear_gaussian_model(primitive, task, DT, len(padded)), padded[..., None])
+    shown = np.stack([o.innovation_variances for o in detector.shown])
+    np.testing.assert_allclose(shown, forward.innovation_covariances[:6, :, 0, 0], rtol=1e-10)
+
+
+def test_a_step_says_what_the_detector_says(primitive, path):
+    watched = OnlineExecution(primitive, task_for(primitive), DT, AlarmAt(2))
+    for o in path[:4]:
+        assert watched.step(o).verdict is watched.verdict
+    assert watched.verdict.failed
+    assert OnlineExecution(primitive, task_for(primitive), DT).step(path[0]).verdict is None
+
+
+@pytest.mark.parametrize("name", ["position", "velocity", "acceleration", "covariance", "contributions", "innovations"])
+@pytest.mark.parametrize("on_alarm", ["continue", "hold"])
+def test_the_arrays_of_a_step_are_read_only(primitive, path, name, on_alarm):
+    execution = OnlineExecution(primitive, task_for(primitive), DT, AlarmAt(1), on_alarm)
+    for o in path[:4]:
+        assert not getattr(execution.step(o), name).flags.writeable
+
+
+def test_an_unknown_start_is_told_by_the_first_observation(primitive):
+    unknown = task_for(primitive, np.full(primitive.n_dof, np.nan))
+    precise = replace(primitive, observation_variances=np.full(primitive.n_dof, 1e-12))
+    away = primitive.start + 0.1
+    for task, wanted in ((unknown, away), (task_for(primitive), primitive.start)):
+        execution = OnlineExecution(precise, task, 1e-6)  # hardly moves in a step
+        np.testing.assert_allclose(execution.step(away).position, wanted, atol=1e-4)
+
+
 def test_continue_goes_on_with_the_filtered_movement(primitive, path):
     watched = OnlineExecution(primitive, task_for(primitive), DT, AlarmAt(20))
     alone = OnlineExecution(primitive, task_for(primitive), DT)

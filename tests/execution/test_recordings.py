@@ -58,12 +58,24 @@ def test_what_is_said_is_taken(primitive):
     assert task.duration == 5
 
 
-def test_a_first_row_that_is_missing_is_as_learned(primitive):
+def test_a_first_row_that_is_missing_is_an_unknown_start(primitive):
     positions = np.ones((10, 2))
     positions[0, 1] = np.nan
-    np.testing.assert_array_equal(task_of_recording(primitive, Demonstration(positions, 0.1)).start, [1.0, primitive.start[1]])
+    task = task_of_recording(primitive, Demonstration(positions, 0.1))
+    np.testing.assert_array_equal(task.start, [1.0, np.nan])
+    tracked = track_recording(primitive, task, Demonstration(positions, 0.1))
+    np.testing.assert_array_equal(tracked.positions[0], [1.0, primitive.start[1]])
+    np.testing.assert_allclose(tracked.position_stds[0], [0.0, np.sqrt(primitive.start_covariances[1, 1, 1])])
     positions[0] = np.nan
-    np.testing.assert_array_equal(task_of_recording(primitive, Demonstration(positions, 0.1)).start, primitive.start)
+    np.testing.assert_array_equal(task_of_recording(primitive, Demonstration(positions, 0.1)).start, [np.nan, np.nan])
+
+
+def test_starts_may_be_known_for_some_only(primitive):
+    recordings = recorded(primitive, np.random.default_rng(8), 3)
+    unknown = [np.nan, np.nan]
+    tasks = [task_of_recording(primitive, r, start) for r, start in zip(recordings, (None, unknown, None), strict=True)]
+    singles = [track_recording(primitive, t, r).log_likelihoods.sum() for t, r in zip(tasks, recordings, strict=True)]
+    np.testing.assert_allclose(score_recordings(primitive, tasks, recordings), singles, rtol=1e-9)
 
 
 # --- one recording ----------------------------------------------------------------------------------------------------
@@ -193,3 +205,32 @@ def test_recordings_of_other_degrees_of_freedom_are_refused(primitive, run):
     other = Demonstration(np.zeros((10, 3)), 0.1, names=("a", "b", "c"))
     with pytest.raises(InputError, match=r"recordings of 2 degrees of freedom \(q0, q1\), got one with 3 \(a, b, c\)"):
         run(primitive, task_for(primitive), other)
+
+
+def one_by_one(primitive, task, recording):
+    return task_of_recording(primitive, recording), score_recordings(primitive, [task], [recording])
+
+
+RUNS = pytest.mark.parametrize("run", [track_recording, smooth_recording, one_by_one], ids=["track", "smooth", "score"])
+
+
+@RUNS
+@pytest.mark.parametrize("names", [("q1", "q0"), ("x", "y")])
+def test_recordings_with_other_names_are_refused(primitive, run, names):
+    other = Demonstration(np.zeros((10, 2)), 0.1, names=names)
+    with pytest.raises(InputError, match=r"recordings of 2 .*\(q0, q1\), got one with 2 \(.*\)\. .*the order that was learned"):
+        run(primitive, task_for(primitive), other)
+
+
+@RUNS
+def test_recordings_in_other_units_are_refused(primitive, run):
+    other = Demonstration(np.zeros((10, 2)), 0.1, names=primitive.names, units="mm")
+    with pytest.raises(InputError, match=r"recordings in m, got one in mm\. Convert"):
+        run(primitive, task_for(primitive), other)
+
+
+@RUNS
+def test_recordings_without_names_or_units_fit_any_primitive(primitive, run):
+    for description in ({}, {"names": ("dof0", "dof1")}, {"names": primitive.names}, {"units": "m"}):
+        run(primitive, task_for(primitive), Demonstration(np.zeros((10, 2)), 0.1, **description))
+    run(replace(primitive, units=""), task_for(primitive), Demonstration(np.zeros((10, 2)), 0.1, units="mm"))

@@ -35,6 +35,7 @@ def test_it_begins_at_the_start_and_ends_near_the_goal(seed):
     start, goal = rng.uniform(-2, 2, (2, 2))
     rolled = roll_out(primitive, task_for(primitive, start, goal), primitive.duration / 100)
     np.testing.assert_allclose(rolled.positions[0], start, rtol=1e-12)
+    np.testing.assert_array_equal(rolled.position_stds[0], 0)
     np.testing.assert_allclose(rolled.positions[-1], goal, atol=1e-3)
 
 
@@ -43,7 +44,7 @@ def drawn(request):
     """A rollout, draws of positions (n, T, D) from it, and draws as a sensor sees them."""
     rng = np.random.default_rng(0)
     primitive = make_primitive(rng, 2, 6, discretization=request.param, duration=0.8)
-    task, dt = task_for(primitive, duration=1.0), 0.02
+    task, dt = task_for(primitive, [np.nan, np.nan], duration=1.0), 0.02  # from a start that is drawn too
     draws = [np.stack(sample_trajectories(primitive, task, dt, N_DRAWS, rng, noisy)) for noisy in (False, True)]
     return primitive, roll_out(primitive, task, dt), *draws
 

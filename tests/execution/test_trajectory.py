@@ -38,5 +38,20 @@ def test_it_is_frozen(trajectory):
         trajectory.times = np.zeros(2)
 
 
+@pytest.mark.parametrize("name", ["times", "means", "covariances", "positions", "velocities", "accelerations"])
+def test_its_arrays_are_read_only(trajectory, name):
+    with pytest.raises(ValueError, match="read-only"):
+        getattr(trajectory, name)[0] = 0
+
+
 def test_a_tracked_trajectory_is_a_trajectory():
     assert issubclass(TrackedTrajectory, GaussianTrajectory)
+
+
+def test_innovation_covariances_are_diagonal(trajectory):
+    zeros, variances = np.zeros((2, 2)), np.array([[1.0, 2.0], [3.0, 4.0]])
+    fields = (trajectory.times, trajectory.means, trajectory.covariances, ("x", "y"), "mm", zeros[0], zeros, zeros)
+    tracked = TrackedTrajectory(*fields, innovation_variances=variances)
+    np.testing.assert_array_equal(tracked.innovation_covariances, [[[1, 0], [0, 2]], [[3, 0], [0, 4]]])
+    for name in ("log_likelihoods", "contributions", "innovations", "innovation_variances"):
+        assert not getattr(tracked, name).flags.writeable

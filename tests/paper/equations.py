@@ -123,39 +123,78 @@ def held_matrices(alpha_z, tau, dt):
     return A, B
 
 
+def held_input(mean_forcing, t, dt):
+    """What the default scheme holds over the step after tick t: f - dt^2 f'' / 24 at the middle, f'' from three values."""
+    before, middle, after = (mean_forcing((t + place) * dt) for place in (0.0, 0.5, 1.0))
+    curvature = (before - 2 * middle + after) / (dt / 2) ** 2
+    return middle - dt**2 / 24 * curvature
+
+
+def held_noise_intensity(alpha_z, phase_step):
+    """Velocity variance that white noise of unit intensity leaves after one step, over that of unit noise held over it.
+
+    In units of the duration. White noise: P' = M P + P M^T + e e^T from P = 0, solved by one matrix exponential.
+    """
+    M = np.array([[-alpha_z, -alpha_z * alpha_z / 4], [1.0, 0.0]])
+    blocks = np.block([[-M, np.diag([1.0, 0.0])], [np.zeros((2, 2)), M.T]])
+    step = expm(blocks * phase_step)
+    P = step[2:, 2:].T @ step[:2, 2:]
+    _, B = held_matrices(alpha_z, 1.0, phase_step)
+    return P[0, 0] / B[1] ** 2
+
+
+def noise_correction(primitive, phase_step):
+    """By how much the variance of f at this step exceeds that at the training step: the velocity spreads as much in a time."""
+    if primitive.configuration.discretization == "semi_implicit_euler":
+        return primitive.phase_step / phase_step
+    alpha_z = primitive.configuration.alpha_z
+    return held_noise_intensity(alpha_z, phase_step) / held_noise_intensity(alpha_z, primitive.phase_step)
+
+
 def system(primitive, d, start, goal, duration, dt, n_steps):
-    """The linear dynamical system of degree of freedom d of a primitive, from its theta and a task."""
+    """The linear dynamical system of degree of freedom d of a primitive, from its theta and a task.
+
+    A start of NaN is unknown: the mean start with the variance of the demonstrations' starts. One that is given is certain.
+    """
     configuration, tau = primitive.configuration, 1 / duration
     alpha_z, n_basis = configuration.alpha_z, configuration.n_basis
     beta_z = alpha_z / 4
     mu_w, Sigma_w, beta = primitive.weight_means[d], primitive.weight_covariances[d], primitive.forcing_precisions[d]
     delta_g = primitive.goal_displacements[d]
     scaled = configuration.scaling == "paper" and abs(delta_g) >= 0.2 * primitive.ranges[d]
+    start_is_known = not math.isnan(start)
+    start = start if start_is_known else primitive.start[d]
     s = (goal - start) / delta_g if scaled else 1.0
     exact = configuration.discretization == "exact"
     A, B = (held_matrices if exact else matrices)(alpha_z, tau, dt)
 
     def forcing(time):
+        return f(phase(time, duration), mu_w)
+
+    correction = noise_correction(primitive, dt / duration)
+
+    def forcing_variance(time):
         features = np.array(phi(phase(time, duration), n_basis))
         variance = features @ Sigma_w @ features
         if configuration.forcing_noise == "predictive":
             variance += 1 / beta
-        return features @ mu_w, variance * primitive.phase_step * duration / dt
+        return variance * correction
 
-    moments = [forcing((t + 0.5 * exact) * dt) for t in range(n_steps - 1)]
-    mean_0, variance_0 = forcing(0.0)
+    ticks = range(n_steps - 1)
+    means = [held_input(forcing, t, dt) if exact else forcing(t * dt) for t in ticks]
+    variances = [forcing_variance((t + 0.5) * dt if exact else t * dt) for t in ticks]
     velocity = primitive.start_velocities[d] / duration
-    # s_0: velocity and position as learned, the acceleration from the differential equation
+    # s_0: velocity as learned, position as given or learned, the acceleration from the differential equation
     lift = np.array([[-alpha_z * tau, -alpha_z * beta_z * tau**2], [1, 0], [0, 1]])
-    units = np.diag([1 / duration, 1.0])
-    mu_0 = lift @ [velocity, start] + [tau**2 * (alpha_z * beta_z * goal + s * mean_0), 0, 0]
+    units = np.diag([1 / duration, 0.0 if start_is_known else 1.0])
+    mu_0 = lift @ [velocity, start] + [tau**2 * (alpha_z * beta_z * goal + s * forcing(0.0)), 0, 0]
     V_0 = lift @ units @ primitive.start_covariances[d] @ units @ lift.T
-    V_0[0, 0] += tau**4 * s**2 * variance_0
+    V_0[0, 0] += tau**4 * s**2 * forcing_variance(0.0)
     return System(
         A,
         B,
-        np.array([alpha_z * beta_z * goal + s * mean for mean, _ in moments]),
-        np.array([s**2 * np.outer(B, B) * variance for _, variance in moments]),
+        np.array([alpha_z * beta_z * goal + s * mean for mean in means]),
+        np.array([s**2 * np.outer(B, B) * variance for variance in variances]),
         np.array([0.0, 0.0, 1.0]),
         float(primitive.observation_variances[d]),
         mu_0,

@@ -85,6 +85,23 @@ def test_rollout_begins_at_the_start_that_is_asked_for(learned):
     assert rolled.times[-1] == pytest.approx(learned.primitive_.duration, abs=learned.primitive_.dt / 2)
 
 
+def test_a_start_that_is_not_known_is_as_learned(learned, letters):
+    """Q_0: the mean start of the demonstrations with their variance, by degree of freedom; a start that is given has none."""
+    starts = np.array([d.positions[0] for d in letters["a"][:10]])
+    rolled = learned.rollout(start=[np.nan, -4.0])
+    np.testing.assert_allclose(rolled.positions[0], [starts[:, 0].mean(), -4.0], rtol=1e-12)
+    np.testing.assert_allclose(rolled.position_stds[0], [starts[:, 0].std(ddof=1), 0.0], rtol=1e-12)
+    np.testing.assert_array_equal(learned.rollout().position_stds[0], 0.0)  # planned from the mean start
+    primitive = learned.primitive_
+    for d, start in enumerate([np.nan, -4.0]):
+        mu, V = paper.algorithm_1(
+            paper.system(primitive, d, start, primitive.goal[d], primitive.duration, rolled.times[1], len(rolled.times))
+        )
+        np.testing.assert_allclose(rolled.means[:, d], mu, rtol=0, atol=1e-10 * np.abs(mu).max())
+        units = np.sqrt(V[:, [0, 1, 2], [0, 1, 2]].max(axis=0))
+        np.testing.assert_allclose(rolled.covariances[:, d] / np.outer(units, units), V / np.outer(units, units), atol=1e-10)
+
+
 def test_rollout_is_a_full_desired_trajectory(published):
     """ "A rollout of the hidden states produces desired accelerations, velocities and positions" that belong together:
     p'_t = p''_t dt + p'_{t-1},  p_t = p'_t dt + p_{t-1}."""

@@ -120,12 +120,30 @@ def test_the_feedback_term_appears_by_itself(learned, recording, goal):
         assert np.abs(feedback[:, 2]).max() > 1e-3 * learned.primitive_.ranges[d]  # it is not nothing
 
 
-def test_without_feedback_execution_is_the_rollout(learned):
+@pytest.mark.parametrize("known", [True, False], ids=["start-known", "start-unknown"])
+def test_without_feedback_execution_is_the_rollout(learned, known):
     """Instead of inference, simply forward predicting the hidden state: no observation, no feedback term."""
-    rolled, execution = learned.rollout(), learned.execute()
+    rolled = learned.rollout() if known else learned.rollout(start=[np.nan, np.nan])
+    execution = learned.execute(start=learned.primitive_.start) if known else learned.execute()
     steps = [execution.step() for _ in rolled.times[1:]]
     np.testing.assert_allclose([s.position for s in steps], rolled.positions[1:], rtol=1e-12)
     np.testing.assert_allclose([s.covariance for s in steps], rolled.covariances[1:], rtol=1e-9, atol=1e-12)
+
+
+def test_the_first_observation_tells_an_unknown_start(learned, recording):
+    """Line 7 at the first tick: where the start is not known, what is measured is weighed with what was learned."""
+    execution = learned.execute(dt=recording.dt)
+    steps = [execution.step(o) for o in recording.positions]
+    primitive = learned.primitive_
+    for d in range(primitive.n_dof):
+        observed = recording.positions[:, d]
+        model = paper.system(primitive, d, np.nan, primitive.goal[d], primitive.duration, recording.dt, len(observed) + 1)
+        run = paper.algorithm_2(model, observed)
+        desired = np.array([[s.acceleration[d], s.velocity[d], s.position[d]] for s in steps])
+        assert_close(desired[:-1], run.mu_p[1:])
+        assert_close(np.array([s.contributions[d] for s in steps]), run.log_likelihoods)
+        variance = primitive.start_covariances[d, 1, 1]
+        assert run.K[0, 2] == pytest.approx(variance / (variance + primitive.observation_variances[d]), rel=1e-12)
 
 
 def test_an_execution_on_the_mean_is_not_modulated(learned):

@@ -16,12 +16,14 @@ from probdmp.learning import LearningOptions, fit_primitive
 LIKELIHOODS = ("per_step", "cumulative")
 
 
-def statistic_by_hand(primitive, recording, likelihood):
+def statistic_by_hand(primitive, recording, likelihood, goal=None, duration=None):
     """The log-likelihood of an execution by Algorithm 2 in plain loops, positions in units of their range; its own task."""
+    goal = recording.positions[-1] if goal is None else goal
+    duration = recording.duration if duration is None else duration
     values = np.zeros(len(recording.positions))
     for d in range(primitive.n_dof):
         p, r = recording.positions[:, d], primitive.ranges[d]
-        model = paper.system(primitive, d, p[0], p[-1], recording.duration, recording.dt, len(p))
+        model = paper.system(primitive, d, p[0], goal[d], duration, recording.dt, len(p))
         values += paper.algorithm_2(model, p).log_likelihoods + np.log(r)  # density of p / r
     return np.cumsum(values) if likelihood == "cumulative" else values
 
@@ -44,6 +46,25 @@ def test_the_minimum_of_the_training_demonstrations_is_stored(learned, letters, 
     by_hand = min(statistic_by_hand(primitive, recording, likelihood).min() for recording in training)
     (threshold,) = detector.thresholds_.values()
     assert threshold.minimum == pytest.approx(by_hand, rel=1e-9)
+
+
+@pytest.mark.parametrize("likelihood", LIKELIHOODS)
+def test_unless_told_the_tasks_a_detector_knows_what_an_execution_knows(learned, letters, likelihood):
+    """Ours: the start of each recording, the learned goal and duration, as `execute(start=...)` has them."""
+    primitive, training = learned.primitive_, letters["a"][:10]
+    detector = FailureDetector(rule="paper", likelihood=likelihood).fit(primitive, training)
+    by_hand = min(statistic_by_hand(primitive, r, likelihood, primitive.goal, primitive.duration).min() for r in training)
+    (threshold,) = detector.thresholds_.values()
+    assert threshold.minimum == pytest.approx(by_hand, rel=1e-9)
+    d = letters["a"][11]
+    held = replace(d, positions=FAULTS["hold"](d.positions, len(d.positions) // 2, np.random.default_rng(1)))
+    for recording in (d, held):
+        (verdict,) = detector.verdicts([recording])
+        execution = learned.execute(start=recording.positions[0], dt=recording.dt, detector=detector)
+        for o in recording.positions:
+            execution.step(o)
+        assert (execution.verdict.failed, execution.verdict.step) == (verdict.failed, verdict.step)
+        assert execution.verdict.test_ratio == pytest.approx(verdict.test_ratio, rel=1e-9)
 
 
 @pytest.mark.parametrize("likelihood", LIKELIHOODS)
@@ -92,6 +113,9 @@ def test_twice_a_negative_minimum(minimum):
     assert threshold.level == 2 * minimum
     assert threshold.test_ratio(2 * minimum * 1.001) > 1
     assert threshold.test_ratio(2 * minimum * 0.999) < 1
+    for ll in (0.1 * minimum, minimum, 7 * minimum):
+        assert threshold.test_ratio(ll) == pytest.approx(ll / (2 * minimum), rel=1e-14)
+    assert threshold.test_ratio(-minimum) == 0
 
 
 @pytest.mark.parametrize("minimum", [0.5, 3.0, 1e4])
@@ -102,6 +126,8 @@ def test_twice_a_positive_minimum_would_fail_the_training_demonstrations(minimum
     assert threshold.test_ratio(minimum) == 0  # ours: fine
     assert threshold.level == 0
     assert threshold.test_ratio(-0.001 * minimum) > 1
+    for ll in (0.3 * minimum, 0.0, -5 * minimum):
+        assert threshold.test_ratio(ll) == pytest.approx((minimum - ll) / minimum, rel=1e-14)
 
 
 @pytest.mark.parametrize("likelihood", LIKELIHOODS)

@@ -61,6 +61,28 @@ def test_weights_are_the_posterior_of_a_bayesian_regression(regression):
         np.testing.assert_allclose(primitive.weight_covariances[d], Sigma_w, rtol=0, atol=1e-6 * np.abs(Sigma_w).max())
 
 
+@pytest.mark.parametrize("scheme", ["semi_implicit_euler", "exact"])
+def test_the_regressors_are_what_is_held_over_a_step(letters, scheme):
+    """Sigma_w^-1 = alpha + beta Phi^T Phi, which knows the regressors alone: the basis functions as the scheme holds them."""
+    demonstrations, n_basis = letters["s"][:4], 12
+    configuration = Configuration(n_basis, 25.0, scheme, "none")
+    primitive, _ = fit_primitive(demonstrations, configuration, LearningOptions())
+    Phi = []
+    for demonstration in demonstrations:
+        dt, duration = demonstration.dt, demonstration.duration
+
+        def features(time, duration=duration):
+            return np.array(paper.phi(paper.phase(time, duration), n_basis))
+
+        ticks = range(len(demonstration.positions) - 1)
+        Phi += [paper.held_input(features, t, dt) if scheme == "exact" else features(t * dt) for t in ticks]
+    Phi = np.array(Phi)
+    for d in range(2):
+        alpha, beta = primitive.weight_precisions[d], primitive.forcing_precisions[d]
+        Sigma_w = np.linalg.inv(alpha * np.eye(n_basis) + beta * Phi.T @ Phi)
+        np.testing.assert_allclose(primitive.weight_covariances[d], Sigma_w, rtol=0, atol=1e-9 * np.abs(Sigma_w).max())
+
+
 def test_alpha_and_beta_make_the_demonstrations_likeliest(regression):
     """The paper names alpha and beta among the parameters and not where they come from: they maximise ln N(f | 0, ...)."""
     primitive, data = regression
@@ -226,6 +248,34 @@ def test_EM_never_lowers_the_likelihood_while_learning(letters, configuration, f
     assert np.all(np.diff(history) >= -1e-9 * np.abs(history[1:]))
     assert noise.converged
     np.testing.assert_array_equal(noise.variances, learned.primitive_.observation_variances)
+
+
+def test_the_commanded_start_is_no_measurement(letters):
+    """Ours: R is the likeliest for samples 1 .. T - 1. Sample 0 is the start that is commanded, so it is no evidence on noise.
+
+    By brute force: Algorithm 2 in plain loops, the maximum over R by numerical search. Coarse recordings, so that one sample
+    of each counts; with it R would be smaller.
+    """
+    coarse = [replace(d, positions=d.positions[::8], dt=8 * d.dt) for d in letters["s"][:5]]
+    configuration = Configuration(n_basis=5, forcing_noise="posterior")
+    primitive, _ = fit_primitive(coarse, configuration, LearningOptions())
+    for d in range(2):
+
+        def likeliest(first, d=d):
+            def loss(ln_R):
+                total = 0.0
+                for demonstration in coarse:
+                    p, dt, duration = demonstration.positions[:, d], demonstration.dt, demonstration.duration
+                    model = paper.system(primitive, d, p[0], p[-1], duration, dt, len(p))
+                    total -= paper.algorithm_2(model._replace(R=np.exp(ln_R)), p).log_likelihoods[first:].sum()
+                return total
+
+            guess = np.log(primitive.observation_variances[d])
+            return np.exp(minimize_scalar(loss, bounds=(guess - 2, guess + 2), method="bounded", options={"xatol": 1e-6}).x)
+
+        R, with_the_start = likeliest(1), likeliest(0)
+        assert primitive.observation_variances[d] == pytest.approx(R, rel=2e-3)
+        assert with_the_start < 0.95 * R
 
 
 def test_R_is_recovered_from_demonstrations_of_the_model():
