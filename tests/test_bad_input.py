@@ -37,7 +37,7 @@ def assert_finite(value):
         assert_finite(value.rollout())
     elif dataclasses.is_dataclass(value):
         for field in dataclasses.fields(value):
-            if field.name not in ("innovations", "test_ratio") and not isinstance(value, Demonstration):
+            if field.name not in ("innovations", "test_ratio") and not isinstance(value, Demonstration | Task):
                 assert_finite(getattr(value, field.name))
     elif isinstance(value, list | tuple):
         for item in value:
@@ -199,11 +199,10 @@ def calibration(models, which, recordings, dt):
 
 
 def lists_of_tasks(models, letters, start, goal, duration, velocity, count):
-    try:
-        tasks = [Task(start, goal, duration, velocity)] * count
-    except ProbDMPError as error:
-        assert isinstance(error, ValueError | TypeError)
+    task = refuses_or_works(lambda: Task(start, goal, duration, velocity))
+    if not isinstance(task, Task):
         return
+    tasks = [task] * count
     refuses_or_works(lambda: models[0].score_samples(letters[:2], tasks=tasks))
     refuses_or_works(lambda: FailureDetector().fit(models[0], letters[:2], tasks=tasks))
 
@@ -417,7 +416,7 @@ def test_starts_that_are_not_known(models, letters, start, velocity):
         assert_finite(p.execute(start, start_velocity=velocity).step())
 
 
-@pytest.mark.parametrize("stiffness", [41.0, 400.0, 900.0])
+@pytest.mark.parametrize("stiffness", [41.0, 900.0])
 def test_steps_too_coarse_for_the_spring(letters, stiffness):
     """Numbers of the exact scheme are sound for alpha_z dt / duration up to 40."""
     p = ProbabilisticDMP(5, alpha_z=1e3).fit(letters)

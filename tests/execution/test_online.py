@@ -1,5 +1,6 @@
 """Execution tick by tick: the same numbers as over a recording, whatever the clock does."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -210,16 +211,6 @@ def test_only_what_is_newer_counts(ticks):
         assert messy.n_dropped == n_late
 
 
-def test_a_clock_that_is_set_back_within_the_movement(primitive, path):
-    """Ten late observations are dropped, then their clock is believed; no tick repeats the same command for longer."""
-    execution = OnlineExecution(primitive, task_for(primitive), DT)
-    for k in range(30):
-        execution.step(path[k], k * DT)
-    times = [execution.step(path[30 + k], (5 + k) * DT).time for k in range(15)]
-    assert execution.n_dropped == 10
-    np.testing.assert_allclose(times[10:], (31 + np.arange(5)) * DT)
-
-
 @pytest.mark.parametrize("jump", [1.7e9, 50.0, -50.0, -1.7e9])
 def test_a_clock_that_is_set_during_the_movement(primitive, path, jump):
     jumping, steady = (OnlineExecution(primitive, task_for(primitive), DT) for _ in range(2))
@@ -360,8 +351,8 @@ def test_an_unknown_start_is_told_by_the_first_observation(primitive):
     precise = replace(primitive, observation_variances=np.full(primitive.n_dof, 1e-12))
     away = primitive.start + 0.1
     for task, wanted in ((unknown, away), (task_for(primitive), primitive.start)):
-        execution = OnlineExecution(precise, task, 1e-6)  # hardly moves in a step
-        np.testing.assert_allclose(execution.step(away).position, wanted, atol=1e-4)
+        execution = OnlineExecution(precise, task, 1e-4)  # hardly moves in a step
+        np.testing.assert_allclose(execution.step(away).position, wanted, atol=2e-3)
 
 
 def test_continue_goes_on_with_the_filtered_movement(primitive, path):

@@ -229,7 +229,7 @@ def one_tensor_less(metadata, tensors):
         (rewritten("primitives", "a", "names", value=[1]), "names and units as text"),
         (rewritten("primitives", "a", "names", value=[{}]), "names and units as text"),
         (rewritten("primitives", "a", "dt", value=-1.0), r"dt > 0 in seconds in m\.probdmp, got -1"),
-        (rewritten("primitives", "a", "dt", value=1e10), r"dt from 1e-09 to 1e\+09 seconds in m\.probdmp, got 1e"),
+        (rewritten("primitives", "a", "dt", value=1e10), r"dt from 1e-09 to 1e\+09 seconds in m\.probdmp, got 10000000000"),
         (rewritten("primitives", "a", "dt", value=None), "dt > 0 in seconds, one number"),
         (rewritten("primitives", "a", "duration", value=10**400), r"duration > 0.* in m\.probdmp"),
         (rewritten("primitives", "a", "n_demonstrations", value=0.5), "n_demonstrations as a whole number"),

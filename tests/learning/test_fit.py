@@ -223,7 +223,19 @@ def test_start_velocities_are_those_of_the_demonstrations():
     primitive = learn([t * v for v in ([1.0, 5.0], [2.0, 5.0], [3.0, 5.0])])
     np.testing.assert_allclose(primitive.start_velocities, [2, 5], rtol=1e-9)
     np.testing.assert_allclose(primitive.start_covariances[:, 0, 0], [1.0, 0.0], atol=1e-9)
-    assert not primitive.start_covariances[:, 1].any()  # the start itself is given
+    assert not primitive.start_covariances[:, 1].any()  # they all start at 0
+
+
+def test_starts_vary_as_those_of_the_demonstrations():
+    t = np.linspace(0, 1, 50)[:, None]
+    primitive = learn([t + np.array(start) for start in ([1.0, 7.0], [3.0, 7.0], [8.0, 7.0])])
+    np.testing.assert_allclose(primitive.start, [4, 7], rtol=1e-12)
+    np.testing.assert_allclose(primitive.start_covariances[:, 1, 1], [13.0, 0.0], rtol=1e-12)
+    assert not primitive.start_covariances[:, [0, 1], [1, 0]].any()
+    known, unknown = (roll_out(primitive, task_for(primitive, start), 0.05) for start in (None, [np.nan, np.nan]))
+    np.testing.assert_array_equal(known.position_stds[0], 0)
+    np.testing.assert_allclose(unknown.position_stds[0], [np.sqrt(13.0), 0.0], rtol=1e-12)
+    np.testing.assert_array_equal(unknown.means, known.means)
 
 
 def test_missing_samples_inside_a_demonstration(letters):

@@ -131,20 +131,19 @@ def held_input(mean_forcing, t, dt):
 
 
 def held_noise_intensity(alpha_z, phase_step):
-    """Velocity variance that white noise of unit intensity leaves after one step, over that of unit noise held over it.
+    """Stationary variance that white noise of unit intensity leaves in the damped velocity, over that of unit held noise.
 
-    In units of the duration. White noise: P' = M P + P M^T + e e^T from P = 0, solved by one matrix exponential.
+    x' = -alpha_z x + noise, in units of the duration; the discrete variance is summed up, step by step.
     """
-    M = np.array([[-alpha_z, -alpha_z * alpha_z / 4], [1.0, 0.0]])
-    blocks = np.block([[-M, np.diag([1.0, 0.0])], [np.zeros((2, 2)), M.T]])
-    step = expm(blocks * phase_step)
-    P = step[2:, 2:].T @ step[:2, 2:]
-    _, B = held_matrices(alpha_z, 1.0, phase_step)
-    return P[0, 0] / B[1] ** 2
+    decay = np.exp(-alpha_z * phase_step)
+    push = (1 - decay) / alpha_z
+    n_steps = int(40 / (alpha_z * phase_step)) + 1
+    held = np.sum((push * decay ** np.arange(n_steps)) ** 2)
+    return 1 / (2 * alpha_z) / held
 
 
 def noise_correction(primitive, phase_step):
-    """By how much the variance of f at this step exceeds that at the training step: the velocity spreads as much in a time."""
+    """By how much the variance of f at this step exceeds that at the training step: the damped velocity spreads as far."""
     if primitive.configuration.discretization == "semi_implicit_euler":
         return primitive.phase_step / phase_step
     alpha_z = primitive.configuration.alpha_z

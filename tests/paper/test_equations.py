@@ -346,8 +346,8 @@ def test_transition_noise_depends_on_time(published):
 def test_transition_noise_at_another_step(scheme):
     """Ours: sigma_f^2 belongs to the training step; half the step redraws f twice as often, and needs twice the variance.
 
-    Exactly so for semi-implicit Euler. In the exact scheme f is held while the velocity decays: what must agree is the
-    velocity variance that comes in per unit time, and twice is the limit of small steps.
+    Exactly so for semi-implicit Euler. In the exact scheme f is held while the velocity decays: what must agree is how far
+    the damped velocity spreads in the end, and twice is the limit of small steps.
     """
     primitive = make_primitive(np.random.default_rng(10), discretization=scheme)
     step = primitive.phase_step * primitive.duration

@@ -13,7 +13,7 @@ from probdmp.detection.statistics import LIKELIHOODS
 from probdmp.detection.thresholds import PaperThreshold
 from probdmp.detection.verdict import Verdict
 from probdmp.dmp import Primitive, Task
-from probdmp.errors import InputError, NotFittedError
+from probdmp.errors import InputError, InputTypeError, NotFittedError
 from probdmp.execution import check_tasks, task_of_recording
 
 __all__ = ["FailureDetector"]
@@ -114,7 +114,7 @@ class FailureDetector:
         return {"rule": self.rule, "likelihood": self.likelihood, "minima": minima}
 
     @classmethod
-    def from_state(cls, state: Mapping[str, Any], primitives: Mapping[str, Primitive]) -> Self:
+    def from_state(cls, state: object, primitives: Mapping[str, Primitive]) -> Self:
         """A fitted detector from its state and the primitives it was fitted to, by label.
 
         Raises
@@ -122,9 +122,12 @@ class FailureDetector:
         InputError, InputTypeError
             If the state is not one, or that of a detector for other primitives.
         """
+        if not isinstance(state, Mapping):
+            raise InputTypeError("the state of a detector as a mapping", f"{state!r:.100}")
         identities = {primitive.identity for primitive in primitives.values()}
-        if set(state) != {"rule", "likelihood", "minima"} or not identities == set(state["minima"]):
-            raise InputError("a detector with rule, likelihood and a minimum for each primitive", str(sorted(state)))
+        complete = set(state) == {"rule", "likelihood", "minima"} and isinstance(state["minima"], Mapping)
+        if not complete or set(state["minima"]) != identities:
+            raise InputError("a detector with rule, likelihood and a minimum for each primitive", f"{state!r:.200}")
         detector = cls(
             rule=check_choice(state["rule"], "rule", RULES),
             likelihood=check_choice(state["likelihood"], "likelihood", LIKELIHOODS),

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from probdmp.checks import FloatArray
+from probdmp.checks import FloatArray, freeze_arrays
 
 __all__ = ["Verdict"]
 
@@ -25,6 +25,9 @@ class Verdict:
     to blame."""
     names: tuple[str, ...]
     """(D) names of the degrees of freedom."""
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
 
     def __str__(self) -> str:
         if not self.failed:

@@ -29,7 +29,7 @@ class Task:
     """(*batch, D) array, data units per second, known exactly; NaN or None: as learned, with its learned variance."""
 
     def __post_init__(self) -> None:
-        duration = np.asarray(self.duration, dtype=np.float64)
+        duration = check_array(self.duration, "duration", (None,) * getattr(self.duration, "ndim", 0))
         shortest, longest = SECONDS
         if not np.all((duration >= shortest) & (duration <= longest)):  # NaN is neither
             raise InputError(f"duration from {shortest:g} to {longest:g} seconds", f"{self.duration}")
@@ -37,7 +37,7 @@ class Task:
         axes = [*duration.shape, "D"]
         for name in ("start", "goal", "start_velocity"):
             value = getattr(self, name)
-            if value is not None:
+            if value is not None or name != "start_velocity":
                 object.__setattr__(self, name, frozen(check_array(value, name, axes, missing=name != "goal")))
         shapes = {value.shape for value in (self.start, self.goal, self.start_velocity) if value is not None}
         if len(shapes) > 1:

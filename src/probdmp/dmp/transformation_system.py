@@ -42,6 +42,8 @@ ACCELERATION, VELOCITY, POSITION = 0, 1, 2
 
 STABILITY_LIMIT = float(np.sqrt(32) - 4)
 """Semi-implicit Euler is unstable for alpha_z tau dt beyond this, about 1.66."""
+STIFFNESS_LIMIT = 40.0
+"""Of alpha_z tau dt in the exact scheme: by the end of a longer step nothing is left of the velocity that it caused."""
 
 
 class DiscreteSystem(NamedTuple):
@@ -64,8 +66,8 @@ class Discretization:
     noise_offset: float
     """Where in a step the variance of the forcing term is evaluated, in steps after its start."""
     noise_variance: Callable[[FloatArray], FloatArray]
-    """From alpha_z dt / duration: variance, but for a factor, of noise held over a step that moves the velocity as far as
-    white noise of a given intensity does. It decides how the variance of the forcing term depends on the control rate."""
+    """From alpha_z dt / duration: variance, but for a factor, of noise held over a step that does what white noise of a given
+    density does. It decides how the variance of the forcing term depends on the control rate."""
 
 
 def spring_matrix(alpha_z: float, duration: FloatArray) -> FloatArray:
@@ -80,7 +82,7 @@ def _semi_implicit_euler(alpha_z: float, duration: FloatArray, dt: FloatArray) -
         raise InputError(
             f"alpha_z dt / duration <= {STABILITY_LIMIT:.3f}, where semi-implicit Euler is stable",
             f"{np.max(stiffness):.3g}",
-            'Use a smaller dt, or discretization="exact", which is stable at any.',
+            'Use a smaller dt, or discretization="exact", which is stable.',
         )
     a1, a0 = np.moveaxis(spring_matrix(alpha_z, duration), -1, 0)
     zero, one = np.zeros_like(a1), np.ones_like(a1)
@@ -95,6 +97,12 @@ def _exact(alpha_z: float, duration: FloatArray, dt: FloatArray) -> DiscreteSyst
     # Critical damping: a double pole at -k, k = alpha_z tau / 2, so the matrix exponential is exp(-k dt) (1 + ... dt).
     pole = alpha_z / (2 * duration)
     y = pole * dt
+    if np.any(2 * y > STIFFNESS_LIMIT):
+        raise InputError(
+            f"alpha_z dt / duration <= {STIFFNESS_LIMIT:g}, where what is held over a step still moves the velocity at its end",
+            f"{np.max(2 * y):.3g}",
+            "Use a smaller dt or a smaller alpha_z.",
+        )
     decay, decayed = np.exp(-y), -np.expm1(-y)
     zero = np.zeros_like(y)
     velocity = _rows([zero, decay * (1 - y), -pole * y * decay])
@@ -111,11 +119,12 @@ def _rows(entries: list[FloatArray]) -> FloatArray:
 
 
 def _exact_noise_variance(stiffness: FloatArray) -> FloatArray:
-    """The integral of the squared velocity response over a step, over the square of its integral."""
-    # Velocity response to an impulse: exp(-y) (1 - y), y = alpha_z t / (2 duration).
-    y = stiffness / 2
-    decay = np.exp(-2 * y)
-    return np.asarray((1 - decay * (1 - 2 * y + 2 * y**2)) / (4 * y**2 * decay))
+    """What gives a first-order lag of the velocity's damping the stationary variance that white noise would.
+
+    x' = -a x + noise, a = alpha_z / duration: white noise of density S leaves S / (2 a), and noise of variance v held over
+    steps leaves v tanh(a dt / 2) / a^2.
+    """
+    return 1 / np.tanh(stiffness / 2)
 
 
 DISCRETIZATIONS = {

@@ -13,7 +13,7 @@ from probdmp.checks import FloatArray, check_array, check_choice, check_count, c
 from probdmp.demonstrations import Demonstration, Recording, Recordings, as_demonstrations
 from probdmp.detection import FailureDetector
 from probdmp.dmp import PUBLISHED, Configuration, Primitive, Task, task_for
-from probdmp.errors import InputTypeError, NotFittedError
+from probdmp.errors import InputError, InputTypeError, NotFittedError
 from probdmp.estimator.saving import write_learned
 from probdmp.execution import (
     GaussianTrajectory,
@@ -236,9 +236,11 @@ class ProbabilisticDMP:
         stds : (D,) array, data units: standard deviation of each position sensor, > 0.
         """
         learned = self._learned()
-        variances = check_array(stds, "stds", (learned.n_dof,)) ** 2
+        checked = check_array(stds, "stds", (learned.n_dof,))
+        if np.any(checked <= 0):
+            raise InputError("stds > 0", f"{checked.min():g}")
         other = type(self)(**self.get_params())
-        other.primitive_, other.fit_report_ = replace(learned, observation_variances=variances), None
+        other.primitive_, other.fit_report_ = replace(learned, observation_variances=checked**2), None
         return other
 
     def save(self, path: str | Path, detector: FailureDetector | None = None) -> None:

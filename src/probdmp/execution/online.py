@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from probdmp.checks import FloatArray, check_array, check_choice, check_number, check_seconds
+from probdmp.checks import FloatArray, check_array, check_choice, check_number, check_seconds, freeze_arrays
 from probdmp.dmp import Primitive, Task, linear_gaussian_model, step_count
 from probdmp.dmp.phase import phases_at
 from probdmp.dmp.transformation_system import ACCELERATION, POSITION, VELOCITY
@@ -98,6 +98,9 @@ class ExecutionStep:
     """Statistic over threshold of the detector, above 1 for an alarm; NaN without a detector."""
     verdict: Judgement | None
     """What the detector says so far; None without a detector."""
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)  # they are views of the filter's own
 
 
 class OnlineExecution:
@@ -194,8 +197,6 @@ class OnlineExecution:
         self._mean, self._covariance = predict(
             seen.mean, seen.covariance, model.transition, self._drifts[k], self._process_covariances[k]
         )
-        for array in (self._mean, self._covariance):
-            array.setflags(write=False)  # the caller gets views of them
         self._step += 1
         desired = self._desired()
         return ExecutionStep(
@@ -218,7 +219,6 @@ class OnlineExecution:
             return self._mean
         if self._held is None:
             self._held = self._mean * np.eye(3)[POSITION]
-            self._held.setflags(write=False)
         return self._held
 
     def _load(self, first: int) -> None:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from probdmp.checks import FloatArray
+from probdmp.checks import FloatArray, shape_text
 from probdmp.demonstrations import Demonstration, stack_positions
 from probdmp.dmp import Primitive, Task, linear_gaussian_model, task_for
 from probdmp.errors import InputError, InputTypeError
@@ -87,6 +87,9 @@ def check_tasks(tasks: Sequence[Task], recordings: Sequence[Demonstration]) -> S
         raise InputTypeError("tasks as a list of Task", f"{tasks!r:.100}", "task_for(primitive, …) in probdmp.dmp makes them.")
     if len(tasks) != len(recordings):
         raise InputError(f"one task for each of {len(recordings)} recordings", f"{len(tasks)}")
+    for task, recording in zip(tasks, recordings, strict=True):
+        if task.start.shape != (recording.n_dof,):
+            raise InputError(f"tasks of {recording.n_dof} degrees of freedom", f"one of shape {shape_text(task.start.shape)}")
     return tasks
 
 

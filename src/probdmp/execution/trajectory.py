@@ -1,10 +1,10 @@
 """Trajectories with their uncertainty."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
-from probdmp.checks import FloatArray
+from probdmp.checks import FloatArray, freeze_arrays
 from probdmp.dmp.transformation_system import ACCELERATION, POSITION, VELOCITY
 
 __all__ = ["HALF_BAND", "GaussianTrajectory", "TrackedTrajectory"]
@@ -29,9 +29,7 @@ class GaussianTrajectory:
     """Unit of the positions, free text."""
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            if isinstance(array := getattr(self, field.name), np.ndarray):
-                array.setflags(write=False)
+        freeze_arrays(self)
 
     @property
     def positions(self) -> FloatArray:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from probdmp.checks import FloatArray, check_choice, check_fraction
+from probdmp.checks import FloatArray, check_choice, check_fraction, freeze_arrays
 from probdmp.learning.observation_noise import ObservationNoise
 
 __all__ = ["FitReport", "LearningOptions"]
@@ -32,3 +32,6 @@ class FitReport:
     """(K, D) array: root mean square of demonstration minus rollout of the same task, as a fraction of the range."""
     observation_noise: ObservationNoise
     """The EM iterations behind R."""
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
