@@ -1,6 +1,5 @@
 """Values to write: random primitives, and a folder that lasts for all examples of a property."""
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -59,12 +58,3 @@ def small_model(make_primitive: MakePrimitive) -> ModelContents:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder that the examples of one property may share."""
     return tmp_path_factory.mktemp("files")
-
-
-@pytest.fixture
-def recordings() -> Path:
-    """The folder of real recordings, on machines that have it."""
-    place = os.environ.get("PROBDMP_RECORDINGS")
-    if not place:
-        pytest.skip("real recordings: set PROBDMP_RECORDINGS to their folder")
-    return Path(place)

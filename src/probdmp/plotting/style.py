@@ -1,6 +1,7 @@
 """One style for all pictures: few colours that differ in lightness too, so that they survive black-and-white print."""
 
 from contextlib import AbstractContextManager
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from probdmp.errors import MissingExtraError
@@ -37,10 +38,8 @@ SETTINGS: Any = {
 
 def require_matplotlib() -> None:
     """Refuse, with the command to type, where matplotlib is not installed."""
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError as error:
-        raise MissingExtraError("matplotlib for plots", "none installed", "Type: pip install 'probdmp[plot]'") from error
+    if find_spec("matplotlib") is None:
+        raise MissingExtraError("matplotlib for plots", "none installed", "Type: pip install 'probdmp[plot]'")
 
 
 def figure_style() -> AbstractContextManager[None]:
