@@ -176,7 +176,7 @@ def constructor_arguments(letters, name, value):
 
 def task_arguments(models, which, start, goal, duration, ratio, velocity):
     """`ratio`: dt, or how many of them there are in the duration."""
-    dt = duration / ratio if isinstance(duration, float) and type(ratio) is int and ratio > 0 else ratio
+    dt = duration / ratio if isinstance(duration, float) and type(ratio) is int and 0 < ratio < 10**12 else ratio
     refuses_or_works(lambda: models[which].rollout(start, goal, duration, dt, velocity))
     refuses_or_works(lambda: models[which].sample(1, start, goal, duration, dt, velocity, random_state=0))
 
