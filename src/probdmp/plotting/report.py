@@ -48,7 +48,8 @@ The rule is the paper's: failed below twice the least value over the training de
 velocity and acceleration with 95 % bands, as planned.</figcaption></figure>
 <h2>One execution, as recorded and blocked</h2>
 <figure>{failure}<figcaption>The learned band with an execution as recorded (solid green), the same execution blocked at
-{onset:.2f} s (dashed orange), and the log-likelihood of both. {verdict}</figcaption></figure>
+{onset:.2f} s (dashed orange), and the log-likelihood of both. Shown is the first test
+execution that was judged rightly both times, if there was one. {verdict}</figcaption></figure>
 <h2>Make it again</h2>
 <p><code>{command}</code></p>
 </html>
