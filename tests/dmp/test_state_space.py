@@ -123,19 +123,19 @@ def test_exact_path_does_not_depend_on_the_control_rate(letters):
         assert (np.abs(slow - fast)[..., 2] / primitive.ranges).max() < 1e-3
 
 
-def test_exact_path_is_of_second_order_in_the_step(letters):
-    """Half the step, a quarter of the error; with forcing held from the step's start it would be half."""
+def test_exact_path_is_of_second_order_in_the_step_at_least(letters):
+    """Half the step, less than a quarter of the error; with forcing held from the step's start it would be half."""
     for primitive in letters:
         task = task_for(primitive, duration=round(primitive.duration, 2))
         best = rolled(primitive, task, 0.000625).means[..., 2]
         coarse, fine = (
             np.abs(rolled(primitive, task, dt).means[..., 2] - best[:: round(dt / 0.000625)]).max() for dt in (0.01, 0.005)
         )
-        assert 3.3 < coarse / fine < 5
+        assert coarse / fine > 4
 
 
 def test_exact_path_of_recorded_letters_hardly_depends_on_the_control_rate(recordings):
-    """These letters are short, 100 Hz is coarse for them; measured: median 5e-4 of the range, up to 1.2e-3; 1.9 % of bands."""
+    """These letters are short, 100 Hz is coarse for them; measured: up to 2.5e-4 of the range; 2 % of bands."""
     demos = read_demonstrations(recordings / "uci_letters" / "letters.npz")
     paths, bands = [], []
     for label in sorted({d.label for d in demos}):
@@ -147,8 +147,7 @@ def test_exact_path_of_recorded_letters_hardly_depends_on_the_control_rate(recor
         coarse, fine = (np.sqrt(np.diagonal(r.covariances, axis1=-2, axis2=-1))[..., 1:] for r in (slow, fast))
         bands.append((np.abs(coarse - fine[::10]).max(axis=0) / coarse.max(axis=0)).max())
     assert len(paths) == 20
-    assert np.sum(np.array(paths) < 1e-3) >= 19
-    assert max(paths) < 1.3e-3
+    assert max(paths) < 5e-4
     assert max(bands) < 0.02
 
 
@@ -168,7 +167,7 @@ def test_bands_do_not_depend_on_the_control_rate(letters, noise):
 @settings(max_examples=20)
 @given(seeds, st.floats(0.3, 3), st.sampled_from(SCHEMES), st.sampled_from([0.002, 0.01, 0.03]))
 def test_what_is_held_over_a_step_and_how_it_is_uncertain(seed, slower, scheme, phase_step):
-    """Euler: the forcing term at the start of the step; exact: (-f(start) + 8 f(middle) - f(end)) / 6."""
+    """Euler: the forcing term at the start of the step; exact: (-f(start) + 8 f(middle) - f(end)) / 6, at first less f' dt / 12."""
     primitive = make_primitive(
         np.random.default_rng(seed), discretization=scheme, phase_step=phase_step, forcing_noise="predictive"
     )
@@ -183,6 +182,7 @@ def test_what_is_held_over_a_step_and_how_it_is_uncertain(seed, slower, scheme, 
     if scheme == "exact":
         at = features(times + 0.5)
         held = (-features(times) + 8 * at - features(times + 1.0)) / 6
+        held[0] -= (features(times + 1.0)[0] - features(times)[0]) / 12
     model = linear_gaussian_model(primitive, task, dt, 61)
     wanted = alpha_z**2 / 4 * task.goal + held @ primitive.weight_means.T
     np.testing.assert_allclose(model.inputs[..., 0], wanted, rtol=1e-9, atol=1e-9 * np.abs(wanted).max())

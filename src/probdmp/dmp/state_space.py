@@ -102,19 +102,28 @@ def linear_gaussian_model(
     scheme = DISCRETIZATIONS[primitive.configuration.discretization]
     system = scheme.step(primitive.configuration.alpha_z, task.duration, dt)
     steps = first_step + np.arange(n_steps - 1, dtype=np.float64)
-    held = [weight * control_inputs(primitive, task, dt, steps + place).means for place, weight in scheme.forcing_stencil]
+    means = _held(primitive, task, dt, steps, scheme.forcing_stencil)
+    if first_step == 0:
+        means[:1] = _held(primitive, task, dt, steps[:1], scheme.first_stencil)
     variances = control_inputs(primitive, task, dt, steps + scheme.noise_offset).variances
     mean, covariance = _initial_state(primitive, task, control_inputs(primitive, task, dt, np.zeros(1)))
     return LinearGaussianModel(
         transition=system.transition[..., None, :, :],
         input_matrix=system.input_vector[..., None, :, None],
-        inputs=np.sum(held, axis=0)[..., None],
+        inputs=means[..., None],
         input_covariances=variances[..., None, None],
         observation_matrix=POSITION_SENSOR,
         observation_covariance=primitive.observation_variances[:, None, None],
         initial_mean=mean,
         initial_covariance=covariance,
     )
+
+
+def _held(
+    primitive: Primitive, task: Task, dt: FloatArray, steps: FloatArray, stencil: tuple[tuple[float, float], ...]
+) -> FloatArray:
+    """The mean input held over steps that begin at `steps`, (n, *batch, D) array, data units."""
+    return np.sum([weight * control_inputs(primitive, task, dt, steps + place).means for place, weight in stencil], axis=0)
 
 
 def _initial_state(primitive: Primitive, task: Task, first: ControlInputs) -> tuple[FloatArray, FloatArray]:

@@ -13,7 +13,9 @@ schemes turn it into s[t] = A s[t-1] + B u[t-1] on the state s = (p'', p', p):
 
 `exact` is the zero-order-hold solution (p', p)[t] = Phi (p', p)[t-1] + Gamma u. The acceleration is the mean over the step,
 (p'[t] - p'[t-1]) / dt. What is held is not quite f at the middle of the step: the position answers to held values h as to
-h + dt^2 h'' / 24, so h = f - dt^2 f'' / 24 with f'' from the values at both ends. The path then hardly depends on dt.
+h + dt^2 h'' / 24, so h = f - dt^2 f'' / 24 with f'' from the values at both ends. The first step holds dt f' / 12 less: the
+velocity that goes with held values is not quite the true one, with which a movement starts, but differs from it by -dt^2 / 12
+times the jerk. The path then hardly depends on dt.
 
 The paper prints B = (1, 0, 0)^T and an A on the previous velocity; docs/paper.md says why that cannot be meant.
 """
@@ -63,6 +65,8 @@ class Discretization:
     """(alpha_z, duration (*batch), dt (*batch)) to the matrices of one step."""
     forcing_stencil: tuple[tuple[float, float], ...]
     """What is held over a step: the mean forcing term at places in it, in steps after its start, each with its weight."""
+    first_stencil: tuple[tuple[float, float], ...]
+    """The same for the first step of a movement, before which nothing was held."""
     noise_offset: float
     """Where in a step the variance of the forcing term is evaluated, in steps after its start."""
     noise_variance: Callable[[FloatArray], FloatArray]
@@ -131,10 +135,15 @@ DISCRETIZATIONS = {
     "exact": Discretization(
         _exact,
         forcing_stencil=((0.0, -1 / 6), (0.5, 8 / 6), (1.0, -1 / 6)),
+        first_stencil=((0.0, -1 / 12), (0.5, 8 / 6), (1.0, -3 / 12)),
         noise_offset=0.5,
         noise_variance=_exact_noise_variance,
     ),
     "semi_implicit_euler": Discretization(
-        _semi_implicit_euler, forcing_stencil=((0.0, 1.0),), noise_offset=0.0, noise_variance=np.reciprocal
+        _semi_implicit_euler,
+        forcing_stencil=((0.0, 1.0),),
+        first_stencil=((0.0, 1.0),),
+        noise_offset=0.0,
+        noise_variance=np.reciprocal,
     ),
 }

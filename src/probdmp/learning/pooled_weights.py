@@ -42,7 +42,11 @@ def pooled_weights(primitive: Primitive, tasks: Task, targets: Sequence[FloatArr
 
 def _held_features(configuration: Configuration, n_transitions: int) -> FloatArray:
     """What the basis functions hold over each step of a whole movement, (n_transitions, N) array."""
-    stencil = DISCRETIZATIONS[configuration.discretization].forcing_stencil
+    scheme = DISCRETIZATIONS[configuration.discretization]
     starts = np.arange(n_transitions, dtype=np.float64)
-    held = [w * basis_features(phases_at(starts + place, n_transitions), configuration.n_basis) for place, w in stencil]
-    return np.asarray(sum(held))
+
+    def held(starts: FloatArray, stencil: tuple[tuple[float, float], ...]) -> FloatArray:
+        values = [w * basis_features(phases_at(starts + at, n_transitions), configuration.n_basis) for at, w in stencil]
+        return np.sum(values, axis=0)
+
+    return np.concatenate([held(starts[:1], scheme.first_stencil), held(starts[1:], scheme.forcing_stencil)])
