@@ -167,7 +167,7 @@ def test_bands_do_not_depend_on_the_control_rate(letters, noise):
 @settings(max_examples=20)
 @given(seeds, st.floats(0.3, 3), st.sampled_from(SCHEMES), st.sampled_from([0.002, 0.01, 0.03]))
 def test_what_is_held_over_a_step_and_how_it_is_uncertain(seed, slower, scheme, phase_step):
-    """Euler: the forcing term at the start of the step; exact: (-f(start) + 8 f(middle) - f(end)) / 6, first f' dt / 12 less."""
+    """Euler: the forcing term at the start of the step; exact (-f(start) + 8 f(middle) - f(end)) / 6, first f' dt / 12 less."""
     primitive = make_primitive(
         np.random.default_rng(seed), discretization=scheme, phase_step=phase_step, forcing_noise="predictive"
     )
