@@ -28,6 +28,7 @@ from probdmp.io import ModelContents, write_model
 DEFAULTS = {
     "n_basis": 30, "weight_model": "pooled", "weight_uncertainty": "independent", "forcing_noise": "predictive",
     "discretization": "exact", "scaling": "none", "alpha_z": 25.0, "smoothing": 0.05,
+    "goal_handling": "blend",
 }  # fmt: skip
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from probdmp import PrimitiveLibrary, ProbabilisticDMP, load, load_detector, write_demonstrations
 from probdmp.demonstrations import Demonstration
-from probdmp.dmp.primitive import FORCING_NOISES, SCALINGS
+from probdmp.dmp.configuration import FORCING_NOISES, SCALINGS
 from probdmp.dmp.transformation_system import DISCRETIZATIONS
 
 

@@ -354,7 +354,7 @@ def test_too_coarse_for_semi_implicit_euler_is_said():
         ({"smoothing": -0.1}, "smoothing as a number from 0 to 0.5, got -0.1"),
         ({"smoothing": 0.6}, "smoothing as a number from 0 to 0.5, got 0.6"),
         ({"smoothing": np.nan}, "smoothing as a number from 0 to 0.5, got nan"),
-        ({"weight_model": "mixture"}, "weight_model to be one of 'pooled', got 'mixture'"),
+        ({"weight_model": "mixture"}, "weight_model to be one of 'pooled', 'hierarchical', got 'mixture'"),
     ],
 )
 def test_options_that_cannot_be_used(options, match):

@@ -135,8 +135,8 @@ def _summary(label: str, learned: "ProbabilisticDMP") -> dict[str, Any]:
         **primitive_summary(label, primitive),
         "reproduction_error": float((errors**2).mean() ** 0.5),
         "reproduction_errors": dict(zip(primitive.names, (errors**2).mean(axis=0) ** 0.5, strict=True)),
-        "em_converged": noise.converged,
-        "em_iterations": len(noise.log_likelihoods),
+        "em_converged": None if noise is None else noise.converged,
+        "em_iterations": None if noise is None else len(noise.log_likelihoods),
     }
 
 
@@ -153,7 +153,9 @@ def _print_summaries(summaries: Sequence[Mapping[str, Any]]) -> None:
                 f"{s['duration']:.3f}",
                 f"{100 * s['reproduction_error']:.2f}",
                 by_name(s["sensor_noise_stds"], width=24),
-                f"{s['em_iterations']}" + ("" if s["em_converged"] else ", not converged"),
+                "–"
+                if s["em_iterations"] is None
+                else f"{s['em_iterations']}" + ("" if s["em_converged"] else ", not converged"),
                 *([", ".join(s["not_scaled"])] if scaling else []),
             ]
             for s in summaries

@@ -4,7 +4,7 @@ from probdmp.demonstrations.demonstration import Demonstration, Recording, Recor
 from probdmp.demonstrations.extent import mean_ranges
 from probdmp.demonstrations.faults import FAULTS, hold
 from probdmp.demonstrations.letters import LETTERS, WriterVariation, synthetic_letters
-from probdmp.demonstrations.resampling import demonstration_from_times
+from probdmp.demonstrations.resampling import demonstration_from_times, positions_on_phases
 from probdmp.demonstrations.smoothing import SmoothPath, noise_stds, smooth_path
 
 __all__ = [
@@ -20,6 +20,7 @@ __all__ = [
     "hold",
     "mean_ranges",
     "noise_stds",
+    "positions_on_phases",
     "smooth_path",
     "stack_positions",
     "synthetic_letters",

@@ -1,13 +1,15 @@
-"""From recordings with their own clock to the constant rate that everything else assumes."""
+"""From recordings with their own clock to the constant rate that everything else assumes, and to common phases."""
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from probdmp.checks import check_array, check_seconds, shape_text
+from probdmp.checks import FloatArray, check_array, check_seconds, shape_text
 from probdmp.demonstrations.demonstration import LONGEST_RECORDING, Demonstration
 from probdmp.errors import InputError
 
-__all__ = ["demonstration_from_times"]
+__all__ = ["demonstration_from_times", "positions_on_phases"]
 
 CLOCK_TOLERANCE = 1e-3
 """Fraction of a step by which the last time may miss a sample."""
@@ -56,3 +58,20 @@ def demonstration_from_times(
     grid = step * np.arange(int(n_steps) + 1)
     resampled = np.column_stack([np.interp(grid, since, column) for column in path.T])
     return Demonstration(resampled, step, label, names, units)
+
+
+def positions_on_phases(demonstrations: Sequence[Demonstration], n_phases: int) -> FloatArray:
+    """Positions at n_phases times evenly spaced from first to last sample, along straight lines over what was measured.
+
+    Returns
+    -------
+    (K, n_phases, D) array, data units.
+    """
+    phases = np.linspace(0.0, 1.0, n_phases)
+    paths = np.empty((len(demonstrations), n_phases, demonstrations[0].n_dof))
+    for path, demonstration in zip(paths, demonstrations, strict=True):
+        own = np.linspace(0.0, 1.0, demonstration.n_samples)
+        for d, column in enumerate(demonstration.positions.T):
+            seen = ~np.isnan(column)
+            path[:, d] = np.interp(phases, own[seen], column[seen])
+    return paths

@@ -1,17 +1,23 @@
 """The movement primitive: phase, basis, spring-damper system, forcing term, and the linear system they make."""
 
-from probdmp.dmp.primitive import PUBLISHED, Configuration, Primitive, task_for
+from probdmp.dmp.configuration import PUBLISHED, Configuration
+from probdmp.dmp.path_distribution import path_distribution
+from probdmp.dmp.primitive import Primitive, task_for
 from probdmp.dmp.state_space import control_inputs, linear_gaussian_model, step_count
 from probdmp.dmp.task import Task, demonstrated_tasks
+from probdmp.dmp.variation import PathDistribution, Variation
 
 __all__ = [
     "PUBLISHED",
     "Configuration",
+    "PathDistribution",
     "Primitive",
     "Task",
+    "Variation",
     "control_inputs",
     "demonstrated_tasks",
     "linear_gaussian_model",
+    "path_distribution",
     "step_count",
     "task_for",
 ]

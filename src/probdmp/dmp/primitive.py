@@ -6,55 +6,16 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import ArrayLike
 
-from probdmp.checks import FloatArray, check_array, check_choice, check_count, check_positive, check_seconds, frozen
+from probdmp.checks import FloatArray, check_array, check_count, check_positive, check_seconds, frozen, shape_text
+from probdmp.dmp.configuration import Configuration
 from probdmp.dmp.task import Task
-from probdmp.dmp.transformation_system import DISCRETIZATIONS
+from probdmp.dmp.variation import Variation, check_semidefinite
 from probdmp.errors import InputError, InputTypeError
 
-__all__ = ["FORCING_NOISES", "PUBLISHED", "SCALINGS", "Configuration", "Primitive", "task_for"]
-
-SCALINGS = ("none", "paper")
-FORCING_NOISES = ("posterior", "predictive")
-
-STIFFEST = (1e-3, 1e4)
-"""Least and largest alpha_z."""
+__all__ = ["Primitive", "task_for"]
 
 SCALING_GUARD = 0.2
 """A degree of freedom whose mean displacement is less than this fraction of its range is not scaled."""
-
-
-@dataclass(frozen=True, slots=True)
-class Configuration:
-    """The choices behind a primitive that are not learned."""
-
-    n_basis: int = 30
-    """N, basis functions per degree of freedom."""
-    alpha_z: float = 25.0
-    """Spring constant of the transformation system, dimensionless; beta_z = alpha_z / 4 damps it critically."""
-    discretization: str = "exact"
-    """`"exact"` (zero-order hold) or `"semi_implicit_euler"` (the paper)."""
-    scaling: str = "none"
-    """`"none"`: the forcing term keeps its learned size; `"paper"`: it grows with (g - p0) / mean (g - p0)."""
-    forcing_noise: str = "predictive"
-    """`"posterior"`: the variance of the mean forcing term; `"predictive"`: with the regression noise 1 / beta."""
-
-    @property
-    def stiffness(self) -> float:
-        """alpha_z beta_z, by which the distance to the goal accelerates the movement, in units of the duration."""
-        return self.alpha_z**2 / 4
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "n_basis", check_count(self.n_basis, "n_basis", most=1000))
-        object.__setattr__(self, "alpha_z", check_positive(self.alpha_z, "alpha_z"))
-        if not STIFFEST[0] <= self.alpha_z <= STIFFEST[1]:
-            raise InputError(f"alpha_z from {STIFFEST[0]:g} to {STIFFEST[1]:g}", repr(self.alpha_z), "25 is usual.")
-        check_choice(self.discretization, "discretization", DISCRETIZATIONS)
-        check_choice(self.scaling, "scaling", SCALINGS)
-        check_choice(self.forcing_noise, "forcing_noise", FORCING_NOISES)
-
-
-PUBLISHED = Configuration(discretization="semi_implicit_euler", scaling="paper")
-"""The paper's choices; docs/paper.md says which it leaves open."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,6 +63,8 @@ class Primitive:
     """(D) names of the degrees of freedom."""
     units: str = ""
     """Unit of the positions, free text."""
+    variation: Variation | None = None
+    """How the demonstrations differ from each other; None with pooled weights, which say nothing of it."""
 
     def __post_init__(self) -> None:
         d, n = len(self.names), self.configuration.n_basis
@@ -114,7 +77,7 @@ class Primitive:
             if np.any(getattr(self, name) <= 0):
                 raise InputError(f"{name} > 0", f"{getattr(self, name).min():g}")
         for name in ("weight_covariances", "start_covariances"):
-            _check_semidefinite(getattr(self, name), name)
+            check_semidefinite(getattr(self, name), name)
         for name in ("duration", "dt", "phase_step"):
             check = check_positive if name == "phase_step" else check_seconds
             object.__setattr__(self, name, check(getattr(self, name), name))
@@ -124,6 +87,8 @@ class Primitive:
         if d < 1 or len(set(self.names)) < d:
             raise InputError("at least one name, all different", repr(self.names))
         object.__setattr__(self, "names", tuple(self.names))
+        if self.variation is not None and self.variation.means.shape != (d, n + 2):
+            raise InputError(f"variation of shape {shape_text((d, n + 2))}", shape_text(self.variation.means.shape))
 
     @property
     def n_dof(self) -> int:
@@ -145,7 +110,8 @@ class Primitive:
         digest = hashlib.sha256()
         for field in fields(self):
             value = getattr(self, field.name)
-            digest.update(value.tobytes() if isinstance(value, np.ndarray) else repr(value).encode())
+            for part in value.arrays().values() if isinstance(value, Variation) else (value,):
+                digest.update(part.tobytes() if isinstance(part, np.ndarray) else repr(part).encode())
         return digest.hexdigest()
 
     def starts(self, task: Task) -> FloatArray:
@@ -181,10 +147,3 @@ def task_for(
         np.asarray(primitive.duration if duration is None else check_seconds(duration, "duration")),
         None if start_velocity is None else check_array(start_velocity, "start_velocity", shape, missing=True, hint=hint),
     )
-
-
-def _check_semidefinite(covariances: FloatArray, name: str) -> None:
-    slack = 1e-9 * np.max(np.abs(covariances), axis=(-2, -1), initial=0.0)
-    asymmetry = np.max(np.abs(covariances - covariances.mT), axis=(-2, -1), initial=0.0)
-    if np.any(asymmetry > slack) or np.any(np.linalg.eigvalsh(covariances)[:, 0] < -slack):
-        raise InputError(f"{name} symmetric and positive semi-definite", "one that is not", "Was it edited by hand?")

@@ -1,7 +1,7 @@
 """One movement: scikit-learn manners, no arithmetic."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, fields, replace
 from inspect import signature
 from pathlib import Path
 from typing import Any, Self
@@ -30,7 +30,6 @@ from probdmp.learning import FitReport, LearningOptions, fit_primitive
 
 __all__ = ["ProbabilisticDMP"]
 
-WEIGHT_UNCERTAINTIES = ("independent",)
 MOST_SAMPLES = 10_000
 
 
@@ -71,6 +70,7 @@ class ProbabilisticDMP:
         scaling: str = "none",
         alpha_z: float = 25.0,
         smoothing: float = 0.05,
+        goal_handling: str = "blend",
     ) -> None:
         self.n_basis = n_basis
         self.weight_model = weight_model
@@ -80,6 +80,7 @@ class ProbabilisticDMP:
         self.scaling = scaling
         self.alpha_z = alpha_z
         self.smoothing = smoothing
+        self.goal_handling = goal_handling
 
     @classmethod
     def as_published(cls, n_basis: int = 30, *, forcing_noise: str = "predictive") -> Self:
@@ -90,7 +91,7 @@ class ProbabilisticDMP:
         forcing_noise : the paper does not say which; it speaks of a predictive distribution.
         """
         settings = asdict(PUBLISHED) | {"n_basis": n_basis, "forcing_noise": forcing_noise}
-        return cls(weight_model="pooled", weight_uncertainty="independent", smoothing=0.05, **settings)
+        return cls(weight_model="pooled", smoothing=0.05, **settings)
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
         """The constructor's arguments by name."""
@@ -120,8 +121,7 @@ class ProbabilisticDMP:
         InputError, InputTypeError
             If an argument or a demonstration cannot be used; the message names it and says what to do.
         """
-        check_choice(self.weight_uncertainty, "weight_uncertainty", WEIGHT_UNCERTAINTIES)
-        configuration = Configuration(self.n_basis, self.alpha_z, self.discretization, self.scaling, self.forcing_noise)
+        configuration = Configuration(**{field.name: getattr(self, field.name) for field in fields(Configuration)})
         options = LearningOptions(self.weight_model, self.smoothing)
         self.primitive_: Primitive
         self.fit_report_: FitReport | None

@@ -6,8 +6,8 @@
     digest        SHA-256 in hexadecimal over the metadata with the digest blank, "", followed by each tensor in the order
                   of their names: its [name, "F64", shape] as canonical JSON, then its bytes
 
-The arrays of a primitive are tensors named `<i>/<field>`, i the place of its label among the sorted labels. Nothing is ever
-unpickled or imported by name.
+The arrays of a primitive are tensors named `<i>/<field>`, i the place of its label among the sorted labels; those of its
+variation, if `"variation"` is true, `<i>/variation/<field>`. Nothing is ever unpickled or imported by name.
 """
 
 import hashlib
@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from probdmp.checks import FloatArray
-from probdmp.dmp import Configuration, Primitive
+from probdmp.dmp import Configuration, Primitive, Variation
 from probdmp.errors import InputError, InputTypeError, ModelFileError
 from probdmp.io.atomic import write_atomically
 from probdmp.io.canonical_json import dump_json, parse_json
@@ -34,6 +34,7 @@ SCHEMA = "probdmp.primitive/1"
 KEYS = {"schema", "primitives", "settings", "detector", "provenance", "digest"}
 ARRAYS = [field.name for field in fields(Primitive) if field.type is FloatArray]
 VALUES = {field.name for field in fields(Primitive)} - set(ARRAYS)
+VARIATION = [field.name for field in fields(Variation)]
 CONFIGURATION = {field.name for field in fields(Configuration)}
 
 
@@ -70,9 +71,9 @@ def encode_model(contents: ModelContents) -> bytes:
         If the model is too large.
     """
     tensors = {
-        f"{i}/{name}": getattr(primitive, name)
+        f"{i}/{name}": array
         for i, (_, primitive) in enumerate(sorted(contents.primitives.items()))
-        for name in ARRAYS
+        for name, array in _arrays(primitive).items()
     }
     metadata = {
         "schema": SCHEMA,
@@ -134,20 +135,37 @@ def _digest(metadata: Mapping[str, Any], tensors: Mapping[str, FloatArray]) -> s
 
 def _values(primitive: Primitive) -> dict[str, Any]:
     values = {name: getattr(primitive, name) for name in VALUES}
-    return values | {"configuration": asdict(primitive.configuration), "names": list(primitive.names)}
+    varies = primitive.variation is not None
+    return values | {"configuration": asdict(primitive.configuration), "names": list(primitive.names), "variation": varies}
+
+
+def _arrays(primitive: Primitive) -> dict[str, FloatArray]:
+    variation = {} if primitive.variation is None else primitive.variation.arrays()
+    return {name: getattr(primitive, name) for name in ARRAYS} | {f"variation/{name}": a for name, a in variation.items()}
 
 
 def _primitives(given: Any, tensors: Mapping[str, FloatArray]) -> dict[str, Primitive]:
-    if not isinstance(given, dict) or tensors.keys() != {f"{i}/{name}" for i in range(len(given)) for name in ARRAYS}:
+    if not isinstance(given, dict) or tensors.keys() != _tensor_names(given):
         raise InputError(f"primitives with tensors {', '.join(ARRAYS)} each", f"{sorted(tensors)}")
     primitives = {}
     for i, (label, values) in enumerate(sorted(given.items())):
         if not isinstance(values, dict) or values.keys() != VALUES:
             raise InputError(f"primitive {label!r:.100} with {sorted(VALUES)}", repr(values))
-        configuration, names = values["configuration"], values["names"]
+        configuration, names, varies = values["configuration"], values["names"], values["variation"]
         if not isinstance(configuration, dict) or configuration.keys() != CONFIGURATION or not isinstance(names, list):
             raise InputError(f"a configuration with {sorted(CONFIGURATION)} and a list of names", repr(values))
+        if not isinstance(varies, bool):
+            raise InputError("variation as true or false", repr(varies))
         arrays = {name: tensors[f"{i}/{name}"] for name in ARRAYS}
-        rest = {"configuration": Configuration(**configuration), "names": tuple(names)}
+        variation = Variation(**{name: tensors[f"{i}/variation/{name}"] for name in VARIATION}) if varies else None
+        rest = {"configuration": Configuration(**configuration), "names": tuple(names), "variation": variation}
         primitives[label] = Primitive(**values | rest | arrays)
     return primitives
+
+
+def _tensor_names(given: Mapping[str, Any]) -> set[str]:
+    names = {f"{i}/{name}" for i in range(len(given)) for name in ARRAYS}
+    for i, (_, values) in enumerate(sorted(given.items())):
+        if isinstance(values, dict) and values.get("variation") is True:
+            names |= {f"{i}/variation/{name}" for name in VARIATION}
+    return names

@@ -9,11 +9,14 @@ from probdmp.checks import FloatArray
 from probdmp.demonstrations import Demonstration, mean_ranges, noise_stds, smooth_path, stack_positions
 from probdmp.dmp import Configuration, Primitive, Task, demonstrated_tasks, linear_gaussian_model
 from probdmp.dmp.transformation_system import POSITION
+from probdmp.errors import InputError
 from probdmp.gaussian import filter_sequence
 from probdmp.learning.forcing_targets import forcing_targets, scheme_velocities
 from probdmp.learning.observation_noise import ObservationNoise, estimate_observation_noise
 from probdmp.learning.options import FitReport, LearningOptions
 from probdmp.learning.pooled_weights import pooled_weights
+from probdmp.learning.varied_weights import varied_weights
+from probdmp.learning.weight_regression import WeightPosterior
 
 __all__ = ["fit_primitive"]
 
@@ -25,25 +28,35 @@ def fit_primitive(
     demonstrations: Sequence[Demonstration], configuration: Configuration, options: LearningOptions
 ) -> tuple[Primitive, FitReport]:
     """Learn a primitive from K demonstrations, each with its own start, goal, duration and length."""
+    if options.weight_model == "hierarchical" and configuration.scaling == "paper":
+        hint = "Scaled by each goal, a movement is not linear in goal and weights, which vary together."
+        raise InputError('scaling="none" with weight_model="hierarchical"', 'scaling="paper"', hint)
     paths = [smooth_path(d, options.smoothing) for d in demonstrations]
     velocities = [scheme_velocities(p, d.dt, configuration.discretization) for p, d in zip(paths, demonstrations, strict=True)]
     tasks = demonstrated_tasks(demonstrations)
-    targets = [
-        forcing_targets(path.positions, v, goal, d.dt, configuration)
-        for path, v, goal, d in zip(paths, velocities, tasks.goal, demonstrations, strict=True)
-    ]
     still = _still_primitive(demonstrations, tasks, configuration, np.stack([v[0] for v in velocities]))
-    posteriors = pooled_weights(still, tasks, targets)
-    moving = replace(
+    if options.weight_model == "hierarchical":
+        moving = varied_weights(still, demonstrations)
+    else:
+        targets = [
+            forcing_targets(path.positions, v, goal, d.dt, configuration)
+            for path, v, goal, d in zip(paths, velocities, tasks.goal, demonstrations, strict=True)
+        ]
+        moving = _regressed(still, pooled_weights(still, tasks, targets))
+    noise, squared_errors = _observation_noise(moving, tasks, demonstrations)
+    primitive = replace(moving, observation_variances=noise.variances)
+    return primitive, FitReport(np.sqrt(squared_errors) / primitive.ranges, noise)
+
+
+def _regressed(still: Primitive, posteriors: Sequence[WeightPosterior]) -> Primitive:
+    """The primitive with what regression says about its weights."""
+    return replace(
         still,
         weight_means=np.stack([p.mean for p in posteriors]),
         weight_covariances=np.stack([p.covariance for p in posteriors]),
         weight_precisions=np.array([p.alpha for p in posteriors]),
         forcing_precisions=np.array([p.beta for p in posteriors]),
     )
-    noise, squared_errors = _observation_noise(moving, tasks, demonstrations)
-    primitive = replace(moving, observation_variances=noise.variances)
-    return primitive, FitReport(np.sqrt(squared_errors) / primitive.ranges, noise)
 
 
 def _still_primitive(

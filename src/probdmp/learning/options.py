@@ -7,7 +7,7 @@ from probdmp.learning.observation_noise import ObservationNoise
 
 __all__ = ["FitReport", "LearningOptions"]
 
-WEIGHT_MODELS = ("pooled",)
+WEIGHT_MODELS = ("pooled", "hierarchical")
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,7 +15,8 @@ class LearningOptions:
     """How to learn, beside what to learn (`probdmp.dmp.Configuration`)."""
 
     weight_model: str = "pooled"
-    """`"pooled"`: one set of weights behind all demonstrations, found by Bayesian regression (the paper)."""
+    """`"pooled"`: one set of weights behind all demonstrations, found by Bayesian regression (the paper);
+    `"hierarchical"`: every demonstration has its own, drawn from a Gaussian that is learned."""
     smoothing: float = 0.05
     """Window of the Savitzky-Golay filter as a fraction of a demonstration; see `probdmp.demonstrations.smoothing`."""
 
@@ -30,8 +31,8 @@ class FitReport:
 
     reproduction_errors: FloatArray
     """(K, D) array: root mean square of demonstration minus rollout of the same task, as a fraction of the range."""
-    observation_noise: ObservationNoise
-    """The EM iterations behind R."""
+    observation_noise: ObservationNoise | None
+    """The EM iterations behind R; None where R is what the parameters of each demonstration leave unexplained."""
 
     def __post_init__(self) -> None:
         freeze_arrays(self)

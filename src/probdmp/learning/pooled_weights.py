@@ -5,10 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from probdmp.checks import FloatArray
-from probdmp.dmp import Configuration, Primitive, Task
-from probdmp.dmp.basis import basis_features
-from probdmp.dmp.phase import phases_at
-from probdmp.dmp.transformation_system import DISCRETIZATIONS
+from probdmp.dmp import Primitive, Task
+from probdmp.dmp.responses import held_features
 from probdmp.learning.weight_regression import WeightPosterior, regress_weights
 
 __all__ = ["pooled_weights"]
@@ -27,7 +25,7 @@ def pooled_weights(primitive: Primitive, tasks: Task, targets: Sequence[FloatArr
     targets : K arrays (T_k - 1, D) of s f, data units.
     """
     configuration = primitive.configuration
-    features = [_held_features(configuration, len(f)) for f in targets]
+    features = [held_features(configuration, 1 / len(f), len(f)) for f in targets]
     amplitudes = primitive.amplitudes(tasks)
     resolutions = RESOLUTION * configuration.stiffness * primitive.ranges
     return [
@@ -38,15 +36,3 @@ def pooled_weights(primitive: Primitive, tasks: Task, targets: Sequence[FloatArr
         )
         for d in range(primitive.n_dof)
     ]
-
-
-def _held_features(configuration: Configuration, n_transitions: int) -> FloatArray:
-    """What the basis functions hold over each step of a whole movement, (n_transitions, N) array."""
-    scheme = DISCRETIZATIONS[configuration.discretization]
-    starts = np.arange(n_transitions, dtype=np.float64)
-
-    def held(starts: FloatArray, stencil: tuple[tuple[float, float], ...]) -> FloatArray:
-        values = [w * basis_features(phases_at(starts + at, n_transitions), configuration.n_basis) for at, w in stencil]
-        return np.sum(values, axis=0)
-
-    return np.concatenate([held(starts[:1], scheme.first_stencil), held(starts[1:], scheme.forcing_stencil)])

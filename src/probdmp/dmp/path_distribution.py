@@ -1,0 +1,40 @@
+"""The Gaussian over whole paths that a Gaussian over theta makes."""
+
+import numpy as np
+
+from probdmp.checks import FloatArray
+from probdmp.dmp.primitive import Primitive
+from probdmp.dmp.responses import GOAL, START_VELOCITY, WEIGHTS, parameter_responses
+from probdmp.dmp.transformation_system import POSITION
+from probdmp.dmp.variation import PathDistribution
+
+__all__ = ["parameter_distribution", "path_distribution"]
+
+
+def parameter_distribution(primitive: Primitive) -> tuple[FloatArray, FloatArray]:
+    """Mean (D (N + 2)) and covariance (D (N + 2), D (N + 2)) of theta, data units, for a new execution.
+
+    As learned, if the primitive has a `Variation`. Pooled weights know nothing of executions that differ: then theta is as
+    uncertain as the mean movement, with a known goal, and degrees of freedom are independent.
+    """
+    if primitive.variation is not None:
+        return primitive.variation.means.ravel(), primitive.variation.covariance
+    d, n = primitive.n_dof, primitive.configuration.n_basis + 2
+    means, covariance = np.empty((d, n)), np.zeros((d, n, d, n))
+    means[:, START_VELOCITY] = primitive.start_velocities
+    means[:, GOAL] = primitive.goal - primitive.start
+    means[:, WEIGHTS] = primitive.weight_means
+    own = np.arange(d)
+    covariance[own, START_VELOCITY, own, START_VELOCITY] = primitive.start_covariances[:, 0, 0]
+    covariance[own, WEIGHTS, own, WEIGHTS] = primitive.weight_covariances
+    return means.ravel(), covariance.reshape(d * n, d * n)
+
+
+def path_distribution(primitive: Primitive, n_phases: int) -> PathDistribution:
+    """Displacements from the start, y(s) = p(s) - p0, of a new execution on n_phases phases s evenly spaced from 0 to 1."""
+    mean, covariance = parameter_distribution(primitive)
+    responses = parameter_responses(primitive.configuration, 1 / (n_phases - 1), n_phases)[:, POSITION]
+    d, n = primitive.n_dof, responses.shape[1]
+    half = np.einsum("mi,diej->mdej", responses, covariance.reshape(d, n, d, n))
+    full = half @ responses.T  # (M, D, D, M)
+    return PathDistribution(responses @ mean.reshape(d, n).T, np.moveaxis(full, -1, 2))
