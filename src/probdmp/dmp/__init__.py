@@ -4,7 +4,7 @@ from probdmp.dmp.configuration import PUBLISHED, Configuration
 from probdmp.dmp.path_distribution import path_distribution
 from probdmp.dmp.primitive import Primitive, task_for
 from probdmp.dmp.state_space import control_inputs, linear_gaussian_model, step_count
-from probdmp.dmp.task import Task, demonstrated_tasks
+from probdmp.dmp.task import Task, demonstrated_tasks, stack_tasks
 from probdmp.dmp.variation import PathDistribution, Variation
 
 __all__ = [
@@ -18,6 +18,7 @@ __all__ = [
     "demonstrated_tasks",
     "linear_gaussian_model",
     "path_distribution",
+    "stack_tasks",
     "step_count",
     "task_for",
 ]

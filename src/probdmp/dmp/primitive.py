@@ -118,11 +118,15 @@ class Primitive:
         """p0, (*batch, D) array: where a task starts, as far as it is known; the mean start elsewhere."""
         return np.where(np.isnan(task.start), self.start, task.start)
 
+    def goals(self, task: Task) -> FloatArray:
+        """g, (*batch, D) array: where a task ends, as far as it is told; the mean goal elsewhere."""
+        return np.where(np.isnan(task.goal), self.goal, task.goal)
+
     def amplitudes(self, task: Task) -> FloatArray:
         """s, (*batch, D) array: by how much a task scales the forcing term."""
         scaled = np.array(self.scaled)
         reference = np.where(scaled, self.goal_displacements, 1.0)
-        return np.where(scaled, (task.goal - self.starts(task)) / reference, 1.0)
+        return np.where(scaled, (self.goals(task) - self.starts(task)) / reference, 1.0)
 
 
 def task_for(
@@ -143,7 +147,7 @@ def task_for(
     shape, hint = (primitive.n_dof,), f"One number for each of {', '.join(primitive.names)}."
     return Task(
         check_array(primitive.start if start is None else start, "start", shape, missing=True, hint=hint),
-        check_array(primitive.goal if goal is None else goal, "goal", shape, hint=hint),
+        np.full(shape, np.nan) if goal is None else check_array(goal, "goal", shape, hint=hint),
         np.asarray(primitive.duration if duration is None else check_seconds(duration, "duration")),
         None if start_velocity is None else check_array(start_velocity, "start_velocity", shape, missing=True, hint=hint),
     )

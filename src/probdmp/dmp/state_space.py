@@ -77,7 +77,7 @@ def control_inputs(primitive: Primitive, task: Task, dt: FloatArray | float, ste
     variance_at = DISCRETIZATIONS[configuration.discretization].noise_variance
     learned_step = np.asarray(configuration.alpha_z * primitive.phase_step)
     correction = (variance_at(configuration.alpha_z * dt / duration) / variance_at(learned_step))[..., None]
-    means = configuration.stiffness * task.goal + amplitude * forcing.means
+    means = configuration.stiffness * primitive.goals(task) + amplitude * forcing.means
     return ControlInputs(means, amplitude**2 * forcing.variances * correction)
 
 

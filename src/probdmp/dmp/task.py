@@ -9,7 +9,7 @@ from probdmp.checks import SECONDS, FloatArray, check_array, frozen, shape_text
 from probdmp.demonstrations import Demonstration
 from probdmp.errors import InputError
 
-__all__ = ["Task", "demonstrated_tasks"]
+__all__ = ["Task", "demonstrated_tasks", "stack_tasks"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,7 +22,7 @@ class Task:
     start: FloatArray
     """p0, (*batch, D) array, data units; NaN where it is not known: as learned, with its learned variance."""
     goal: FloatArray
-    """g, (*batch, D) array, data units."""
+    """g, (*batch, D) array, data units; NaN where it is not told: as learned, where the weights are joint with its variance."""
     duration: FloatArray
     """T_d, (*batch) array, seconds."""
     start_velocity: FloatArray | None = None
@@ -38,10 +38,21 @@ class Task:
         for name in ("start", "goal", "start_velocity"):
             value = getattr(self, name)
             if value is not None or name != "start_velocity":
-                object.__setattr__(self, name, frozen(check_array(value, name, axes, missing=name != "goal")))
+                object.__setattr__(self, name, frozen(check_array(value, name, axes, missing=True)))
         shapes = {value.shape for value in (self.start, self.goal, self.start_velocity) if value is not None}
         if len(shapes) > 1:
             raise InputError("start, goal and start_velocity of one shape", " and ".join(map(shape_text, sorted(shapes))))
+
+
+def stack_tasks(tasks: Sequence[Task]) -> Task:
+    """Single tasks as one batch."""
+    unknown = np.full(tasks[0].start.shape, np.nan)
+    return Task(
+        np.stack([t.start for t in tasks]),
+        np.stack([t.goal for t in tasks]),
+        np.stack([t.duration for t in tasks]),
+        np.stack([unknown if t.start_velocity is None else t.start_velocity for t in tasks]),
+    )
 
 
 def demonstrated_tasks(demonstrations: Sequence[Demonstration]) -> Task:

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from probdmp.checks import FloatArray, check_array, check_choice, check_number, check_seconds, freeze_arrays
-from probdmp.dmp import Primitive, Task, linear_gaussian_model, step_count
+from probdmp.dmp import Primitive, Task, step_count
 from probdmp.dmp.phase import phases_at
 from probdmp.dmp.transformation_system import ACCELERATION, POSITION, VELOCITY
-from probdmp.gaussian import predict, update
+from probdmp.execution.step_filters import STEP_FILTERS, StepFilter
 
 __all__ = ["ExecutionStep", "Judgement", "Monitor", "Observed", "OnlineExecution"]
 
@@ -127,10 +127,8 @@ class OnlineExecution:
 
     def reset(self) -> None:
         """Back to the start, alarm cleared."""
-        self._load(0)
-        model = self._model
-        self._mean = model.initial_mean
-        self._covariance = model.initial_covariance
+        kind = STEP_FILTERS[self.primitive.configuration.weight_uncertainty]
+        self._filter: StepFilter = kind(self.primitive, self.task, self.dt, self._chunk)
         self._monitor = self._detector.monitor(self.primitive) if self._detector is not None else None
         self._step, self._clock_offset, self.n_dropped, self._n_late = 0, 0.0, 0, 0
         self._held: FloatArray | None = None
@@ -184,45 +182,33 @@ class OnlineExecution:
 
     def _advance(self, measured: FloatArray) -> ExecutionStep:
         """One tick: update with what is measured (Alg. 2, lines 5-8), predict the next state (lines 3-4)."""
-        model, t = self._model, self._step
-        seen = update(self._mean, self._covariance, measured[:, None], model.observation_matrix, model.observation_covariance)
+        t = self._step
+        seen = self._filter.update(measured)
         time = t * self.dt
         phase = float(phases_at(np.asarray(time), self.task.duration))
-        variances = seen.innovation_covariance[:, 0, 0]
-        observed = Observed(t, time, phase, seen.log_likelihood, seen.innovation[:, 0], variances)
+        observed = Observed(t, time, phase, seen.contributions, seen.innovations, seen.innovation_variances)
         test_ratio = self._monitor.update(observed) if self._monitor is not None else np.nan
-        if t - self._first == len(self._drifts):
-            self._load(t)
-        k = t - self._first
-        self._mean, self._covariance = predict(
-            seen.mean, seen.covariance, model.transition, self._drifts[k], self._process_covariances[k]
-        )
+        mean, covariance = self._filter.predict()
         self._step += 1
-        desired = self._desired()
+        desired = self._desired(mean)
         return ExecutionStep(
             time=self._step * self.dt,
             position=desired[:, POSITION],
             velocity=desired[:, VELOCITY],
             acceleration=desired[:, ACCELERATION],
-            covariance=self._covariance,
+            covariance=covariance,
             phase=phase,
-            log_likelihood=float(seen.log_likelihood.sum()),
-            contributions=seen.log_likelihood,
-            innovations=seen.innovation[:, 0],
+            log_likelihood=float(seen.contributions.sum()),
+            contributions=seen.contributions,
+            innovations=seen.innovations,
             test_ratio=test_ratio,
             verdict=self.verdict,
         )
 
-    def _desired(self) -> FloatArray:
+    def _desired(self, mean: FloatArray) -> FloatArray:
         """(D, 3) array: the predicted state, or rest at the position due at the alarm."""
         if self._on_alarm == "continue" or not self.failed:
-            return self._mean
+            return mean
         if self._held is None:
-            self._held = self._mean * np.eye(3)[POSITION]
+            self._held = mean * np.eye(3)[POSITION]
         return self._held
-
-    def _load(self, first: int) -> None:
-        """Prepare the inputs from a step on: the movement need not end after its duration."""
-        self._first = first
-        self._model = linear_gaussian_model(self.primitive, self.task, self.dt, self._chunk, first)
-        self._drifts, self._process_covariances = self._model.drifts(), self._model.process_covariances()

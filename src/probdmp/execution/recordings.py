@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike
 
 from probdmp.checks import FloatArray, shape_text
 from probdmp.demonstrations import Demonstration, stack_positions
-from probdmp.dmp import Primitive, Task, linear_gaussian_model, task_for
+from probdmp.dmp import Primitive, Task, linear_gaussian_model, stack_tasks, task_for
 from probdmp.errors import InputError, InputTypeError
+from probdmp.execution.joint_filtering import FilteredRecordings, filter_joint, joint_executions, joint_moments
 from probdmp.execution.trajectory import GaussianTrajectory, TrackedTrajectory
-from probdmp.gaussian import FilteredSequence, filter_sequence, smooth_sequence
+from probdmp.gaussian import filter_sequence, smooth_sequence
 
 __all__ = ["check_tasks", "filter_recordings", "score_recordings", "smooth_recording", "task_of_recording", "track_recording"]
 
@@ -64,6 +65,10 @@ def track_recording(primitive: Primitive, task: Task, recording: Demonstration) 
 def smooth_recording(primitive: Primitive, task: Task, recording: Demonstration) -> GaussianTrajectory:
     """The state at each time given the whole recording, before and after."""
     _check_recordings(primitive, [recording])
+    if primitive.configuration.weight_uncertainty == "joint":
+        executions = joint_executions(primitive, stack_tasks([task]), np.array([recording.dt]), recording.n_samples)
+        means, covariances = joint_moments(filter_joint(primitive, executions, recording.positions[:, None])[1])
+        return GaussianTrajectory(recording.times, means[:, 0], covariances[:, 0], primitive.names, primitive.units)
     model = linear_gaussian_model(primitive, task, recording.dt, recording.n_samples)
     smoothed = smooth_sequence(model, recording.positions[..., None])
     return GaussianTrajectory(recording.times, *smoothed, primitive.names, primitive.units)
@@ -93,24 +98,15 @@ def check_tasks(tasks: Sequence[Task], recordings: Sequence[Demonstration]) -> S
     return tasks
 
 
-def filter_recordings(primitive: Primitive, tasks: Sequence[Task], recordings: Sequence[Demonstration]) -> FilteredSequence:
+def filter_recordings(primitive: Primitive, tasks: Sequence[Task], recordings: Sequence[Demonstration]) -> FilteredRecordings:
     """Kalman filter over N recordings side by side: arrays (T, N, D, …); after the end of a recording nothing is seen."""
     _check_recordings(primitive, recordings)
     observed = stack_positions(recordings)
     dts = np.array([r.dt for r in recordings])
-    model = linear_gaussian_model(primitive, _stack_tasks(tasks), dts, len(observed))
-    return filter_sequence(model, observed[..., None])
-
-
-def _stack_tasks(tasks: Sequence[Task]) -> Task:
-    """Single tasks as one batch."""
-    unknown = np.full(tasks[0].start.shape, np.nan)
-    return Task(
-        np.stack([t.start for t in tasks]),
-        np.stack([t.goal for t in tasks]),
-        np.stack([t.duration for t in tasks]),
-        np.stack([unknown if t.start_velocity is None else t.start_velocity for t in tasks]),
-    )
+    if primitive.configuration.weight_uncertainty == "joint":
+        return filter_joint(primitive, joint_executions(primitive, stack_tasks(tasks), dts, len(observed)), observed)[0]
+    forward = filter_sequence(linear_gaussian_model(primitive, stack_tasks(tasks), dts, len(observed)), observed[..., None])
+    return FilteredRecordings(forward.filtered, forward.innovations, forward.innovation_covariances, forward.log_likelihoods)
 
 
 def _check_recordings(primitive: Primitive, recordings: Sequence[Demonstration]) -> None:

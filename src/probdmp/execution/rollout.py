@@ -3,8 +3,9 @@
 import numpy as np
 
 from probdmp.checks import FloatArray
-from probdmp.dmp import Primitive, Task, linear_gaussian_model, step_count
+from probdmp.dmp import Primitive, Task, linear_gaussian_model, stack_tasks, step_count
 from probdmp.dmp.transformation_system import POSITION
+from probdmp.execution.joint_filtering import joint_executions, joint_moments, sample_joint
 from probdmp.execution.trajectory import GaussianTrajectory
 from probdmp.gaussian import filter_sequence, sample_sequences
 
@@ -19,10 +20,12 @@ def roll_out(primitive: Primitive, task: Task, dt: float) -> GaussianTrajectory:
     dt : seconds between states.
     """
     n_steps = step_count(float(task.duration), dt)
+    times = np.arange(n_steps, dtype=np.float64) * dt
+    if primitive.configuration.weight_uncertainty == "joint":
+        means, covariances = joint_moments(joint_executions(primitive, stack_tasks([task]), np.array([dt]), n_steps))
+        return GaussianTrajectory(times, means[:, 0], covariances[:, 0], primitive.names, primitive.units)
     rolled = filter_sequence(linear_gaussian_model(primitive, task, dt, n_steps)).filtered
-    return GaussianTrajectory(
-        np.arange(n_steps, dtype=np.float64) * dt, rolled.means, rolled.covariances, primitive.names, primitive.units
-    )
+    return GaussianTrajectory(times, rolled.means, rolled.covariances, primitive.names, primitive.units)
 
 
 def sample_trajectories(
@@ -38,6 +41,12 @@ def sample_trajectories(
     -------
     n_samples arrays (T, D), data units.
     """
-    model = linear_gaussian_model(primitive, task, dt, step_count(float(task.duration), dt))
+    n_steps = step_count(float(task.duration), dt)
+    if primitive.configuration.weight_uncertainty == "joint":
+        executions = joint_executions(primitive, stack_tasks([task]), np.array([dt]), n_steps)
+        paths = sample_joint(executions, n_samples, rng)
+        noise = rng.standard_normal(paths.shape) * np.sqrt(primitive.observation_variances)
+        return list(paths + noise if sensor_noise else paths)
+    model = linear_gaussian_model(primitive, task, dt, n_steps)
     states, observations = sample_sequences(model, n_samples, rng)
     return list(observations[..., 0] if sensor_noise else states[..., POSITION])

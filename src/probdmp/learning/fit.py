@@ -10,7 +10,7 @@ from probdmp.demonstrations import Demonstration, mean_ranges, noise_stds, smoot
 from probdmp.dmp import Configuration, Primitive, Task, demonstrated_tasks, linear_gaussian_model
 from probdmp.dmp.transformation_system import POSITION
 from probdmp.errors import InputError
-from probdmp.gaussian import filter_sequence
+from probdmp.gaussian import LinearGaussianModel, filter_sequence
 from probdmp.learning.forcing_targets import forcing_targets, scheme_velocities
 from probdmp.learning.observation_noise import ObservationNoise, estimate_observation_noise
 from probdmp.learning.options import FitReport, LearningOptions
@@ -43,9 +43,17 @@ def fit_primitive(
             for path, v, goal, d in zip(paths, velocities, tasks.goal, demonstrations, strict=True)
         ]
         moving = _regressed(still, pooled_weights(still, tasks, targets))
-    noise, squared_errors = _observation_noise(moving, tasks, demonstrations)
-    primitive = replace(moving, observation_variances=noise.variances)
-    return primitive, FitReport(np.sqrt(squared_errors) / primitive.ranges, noise)
+    observed, dts = stack_positions(demonstrations), np.array([d.dt for d in demonstrations])
+    model = linear_gaussian_model(moving, tasks, dts, len(observed))
+    squared_errors = np.nanmean((observed - filter_sequence(model).filtered.means[..., POSITION]) ** 2, axis=0)
+    relative_errors = np.sqrt(squared_errors) / moving.ranges
+    if configuration.weight_uncertainty == "joint":
+        if moving.variation is None:  # then R is all that the mean movement leaves unexplained
+            least = OBSERVATION_NOISE_FLOOR * moving.ranges**2
+            moving = replace(moving, observation_variances=np.maximum(squared_errors.mean(axis=0), least))
+        return moving, FitReport(relative_errors, None)
+    noise = _observation_noise(model, observed, squared_errors, moving.ranges)
+    return replace(moving, observation_variances=noise.variances), FitReport(relative_errors, noise)
 
 
 def _regressed(still: Primitive, posteriors: Sequence[WeightPosterior]) -> Primitive:
@@ -98,14 +106,19 @@ def _still_primitive(
 
 
 def _observation_noise(
-    primitive: Primitive, tasks: Task, demonstrations: Sequence[Demonstration]
-) -> tuple[ObservationNoise, FloatArray]:
-    """R by EM, and the mean squared distance of each demonstration from its rollout, (K, D), data units squared."""
-    observed, dts = stack_positions(demonstrations), np.array([d.dt for d in demonstrations])
-    model = linear_gaussian_model(primitive, tasks, dts, len(observed))
-    rollouts = filter_sequence(model).filtered.means[..., POSITION]
-    squared_errors = np.nanmean((observed - rollouts) ** 2, axis=0)
-    observed[0] = np.nan  # the commanded start is this very sample: it would count as measured without error
+    model: LinearGaussianModel, observed: FloatArray, squared_errors: FloatArray, ranges: FloatArray
+) -> ObservationNoise:
+    """R by EM.
+
+    Parameters
+    ----------
+    observed : (T, K, D) array, data units.
+    squared_errors : (K, D) array, data units squared: mean squared distance of each demonstration from its rollout.
+    """
+    unknown = observed.copy()
+    unknown[0] = np.nan  # the commanded start is this very sample: it would count as measured without error
     # The sensor alone, or all that the mean movement leaves unexplained: EM begins with whichever is likelier.
-    guesses = (np.mean([noise_stds(d.positions) ** 2 for d in demonstrations], axis=0), squared_errors.mean(axis=0))
-    return estimate_observation_noise(model, observed, guesses, OBSERVATION_NOISE_FLOOR * primitive.ranges**2), squared_errors
+    sensor = np.mean([noise_stds(path) ** 2 for path in np.moveaxis(observed, 1, 0)], axis=0)
+    return estimate_observation_noise(
+        model, unknown, (sensor, squared_errors.mean(axis=0)), OBSERVATION_NOISE_FLOOR * ranges**2
+    )

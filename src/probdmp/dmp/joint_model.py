@@ -1,0 +1,162 @@
+"""A movement with constant, unknown parameters: the second way to carry their uncertainty.
+
+All that is unknown of an execution is drawn once, x = (p0, theta) of every degree of freedom, and a task tells part of it:
+
+    x = mean + F z,  z ~ N(0, I);    state[t] = rows[t] x,    o[t] = (position of state[t]) + v[t],  v[t] ~ N(0, R)
+
+There is no process noise: what is seen early in a movement says how all of it will go. Inference is over z, in
+`probdmp.gaussian.static`; F has no more columns than x has independent directions.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from probdmp.checks import FloatArray
+from probdmp.dmp.goal_handling import conditioned_part
+from probdmp.dmp.path_distribution import parameter_distribution
+from probdmp.dmp.primitive import Primitive
+from probdmp.dmp.responses import GOAL, START_VELOCITY
+from probdmp.dmp.task import Task
+from probdmp.dmp.transformation_system import POSITION
+from probdmp.gaussian import Belief, linear_moments, observe, unit_belief
+
+__all__ = ["JointModel", "joint_model", "state_designs", "state_rows"]
+
+START = 0
+"""Where p0 is in x; the parameters follow, each one place further than in theta."""
+ROUNDING = 1e-15
+"""Directions of x with less of its variance than this times their number are none."""
+TOLD_TOLERANCE = 1e-6
+"""Standard deviation of a start velocity that was told, as a fraction of the range."""
+
+
+class JointModel(NamedTuple):
+    """x = means + factors z, and what is known about z; all arrays may have batch axes in front."""
+
+    means: FloatArray
+    """(*batch, D, N + 3) array, data units."""
+    factors: FloatArray
+    """F, (*batch, D, N + 3, r) array, data units."""
+    belief: Belief
+    """Of z, (*batch, r)."""
+
+    def observed(self, rows: FloatArray, values: FloatArray, variances: FloatArray) -> "JointModel":
+        """Given values (*batch, D) of rows (*batch, N + 3) of each degree of freedom; NaN where nothing was seen."""
+        design = _design(self.factors, rows[..., None, :])[..., 0, :]
+        return self._replace(belief=observe(self.belief, values - _along(self.means, rows), design, variances).belief)
+
+
+def joint_model(primitive: Primitive, task: Task, end_rows: FloatArray) -> JointModel:
+    """What is known about an execution before it begins.
+
+    Parameters
+    ----------
+    task : one task, or a batch of tasks with leading axes `*batch`.
+    end_rows : (*batch, N + 3) or (N + 3) array: the position at the end as a function of x, see `state_rows`.
+    """
+    batch, handling = task.start.shape[:-1], primitive.configuration.goal_handling
+    mean, factor = _start_and_parameters(primitive)
+    factors = np.array(np.broadcast_to(factor, (*batch, *factor.shape)))
+    factors[..., START, :] *= np.isnan(task.start)[..., None]
+    means = np.array(np.broadcast_to(mean, (*batch, *mean.shape)))
+    means[..., START] = primitive.starts(task)
+    model = JointModel(means, factors, unit_belief(batch, factor.shape[-1]))
+    if task.start_velocity is not None:
+        told = task.start_velocity * task.duration[..., None]
+        row = np.eye(mean.shape[-1])[START_VELOCITY + 1]
+        model = _told(model, row, told, (TOLD_TOLERANCE * primitive.ranges) ** 2, START_VELOCITY + 1, handling)
+    variation = primitive.variation
+    tolerances = primitive.observation_variances if variation is None else variation.residual_variances
+    # A goal that was not told stays where it was learned: from another start, the movement to it is another.
+    moved = np.where(np.isnan(task.goal), primitive.start - primitive.starts(task), np.nan)
+    model = _moved(model, end_rows, moved, tolerances, GOAL + 1, handling)
+    return _told(model, end_rows, task.goal, tolerances, GOAL + 1, handling)
+
+
+def state_rows(responses: FloatArray, duration: FloatArray) -> FloatArray:
+    """Acceleration, velocity and position as linear functions of x.
+
+    Parameters
+    ----------
+    responses : (*shape, 3, N + 2) array, in phase units; see `probdmp.dmp.responses`.
+    duration : T_d, an array that broadcasts against `shape`, seconds.
+
+    Returns
+    -------
+    (*shape, 3, N + 3) array.
+    """
+    scale = np.stack([duration**-2.0, duration**-1.0, np.ones_like(duration)], axis=-1)
+    start = np.broadcast_to(np.eye(3)[POSITION][:, None], (*responses.shape[:-1], 1))
+    return np.concatenate([start, responses * scale[..., None]], axis=-1)
+
+
+def state_designs(model: JointModel, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The states of one time as functions of z: offsets (*batch, D, 3) and designs (*batch, D, 3, r).
+
+    Parameters
+    ----------
+    rows : (*batch, 3, N + 3) array, see `state_rows`.
+    """
+    return np.matmul(model.means, rows.mT), _design(model.factors, rows)
+
+
+def _start_and_parameters(primitive: Primitive) -> tuple[FloatArray, FloatArray]:
+    """Mean of x, (D, N + 3), and F, (D, N + 3, r), of executions whose start is not known."""
+    d, n = primitive.n_dof, primitive.configuration.n_basis + 3
+    theta_mean, theta_covariance = parameter_distribution(primitive)
+    mean = np.concatenate([primitive.start[:, None], theta_mean.reshape(d, n - 1)], axis=1)
+    covariance, own = np.zeros((d, n, d, n)), np.arange(d)
+    covariance[:, 1:, :, 1:] = theta_covariance.reshape(d, n - 1, d, n - 1)
+    covariance[own, START, own, START] = primitive.start_covariances[:, 1, 1]
+    covariance[own, START, own, START_VELOCITY + 1] = primitive.start_covariances[:, 0, 1]
+    covariance[own, START_VELOCITY + 1, own, START] = primitive.start_covariances[:, 0, 1]
+    full = covariance.reshape(d * n, d * n)
+    stds = np.sqrt(np.diagonal(full))
+    stds = np.where(stds > 0, stds, 1.0)
+    eigenvalues, vectors = np.linalg.eigh(full / stds / stds[:, None])
+    kept = eigenvalues > ROUNDING * len(full) * max(float(eigenvalues[-1]), 1e-300)
+    factor = stds[:, None] * vectors[:, kept] * np.sqrt(eigenvalues[kept])
+    return mean, factor.reshape(d, n, -1)
+
+
+def _told(
+    model: JointModel, row: FloatArray, values: FloatArray, tolerances: FloatArray, column: int, handling: str
+) -> JointModel:
+    """Given values (*batch, D) of one row of x, as far as the model has them; the rest moves a column of x."""
+    expected, covariance = _expected(model, row, values, tolerances)
+    delta = np.where(np.isnan(values), 0.0, values - expected)
+    inside = conditioned_part(delta, covariance, handling)
+    told = model.observed(row, np.where(np.isnan(values), np.nan, expected + inside), tolerances)
+    means = told.means.copy()
+    means[..., column] += delta - inside
+    return told._replace(means=means)
+
+
+def _moved(
+    model: JointModel, row: FloatArray, deltas: FloatArray, tolerances: FloatArray, column: int, handling: str
+) -> JointModel:
+    """The mean as if the row were told to be `deltas` from where it is, (*batch, D); as uncertain as before."""
+    if not np.any(deltas > 0) and not np.any(deltas < 0):
+        return model
+    expected, _ = _expected(model, row, deltas, tolerances)
+    told = _told(model, row, expected + deltas, tolerances, column, handling)
+    return told._replace(belief=Belief(told.belief.mean, model.belief.covariance))
+
+
+def _expected(model: JointModel, row: FloatArray, values: FloatArray, tolerances: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Mean (*batch, D) of one row of x, and its covariance, with a unit in place of what has no value."""
+    mean, covariance = linear_moments(model.belief, _design(model.factors, row[..., None, :])[..., 0, :])
+    seen = ~np.isnan(values)
+    full = covariance + tolerances[..., None] * np.eye(len(tolerances))
+    both = seen[..., :, None] & seen[..., None, :]
+    return _along(model.means, row) + mean, np.where(both, full, np.eye(len(tolerances)))
+
+
+def _along(means: FloatArray, row: FloatArray) -> FloatArray:
+    return np.asarray(np.sum(means * row[..., None, :], axis=-1))
+
+
+def _design(factors: FloatArray, rows: FloatArray) -> FloatArray:
+    """Rows (*batch, n, N + 3) of each degree of freedom as functions of z, (*batch, D, n, r)."""
+    return np.matmul(rows[..., None, :, :], factors)
