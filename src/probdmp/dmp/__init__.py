@@ -6,6 +6,7 @@ from probdmp.dmp.primitive import Primitive, task_for
 from probdmp.dmp.state_space import control_inputs, linear_gaussian_model, step_count
 from probdmp.dmp.task import Task, demonstrated_tasks, stack_tasks
 from probdmp.dmp.variation import PathDistribution, Variation
+from probdmp.dmp.via_points import ViaPoint, condition_primitive
 
 __all__ = [
     "PUBLISHED",
@@ -14,6 +15,8 @@ __all__ = [
     "Primitive",
     "Task",
     "Variation",
+    "ViaPoint",
+    "condition_primitive",
     "control_inputs",
     "demonstrated_tasks",
     "linear_gaussian_model",

@@ -22,7 +22,7 @@ from probdmp.checks import FloatArray
 
 __all__ = ["REACH", "conditioned_part"]
 
-REACH = 2.5
+REACH = 3.0
 """Standard deviations of the demonstrations that are trusted."""
 
 

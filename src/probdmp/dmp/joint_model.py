@@ -14,7 +14,7 @@ import numpy as np
 
 from probdmp.checks import FloatArray
 from probdmp.dmp.goal_handling import conditioned_part
-from probdmp.dmp.path_distribution import parameter_distribution
+from probdmp.dmp.path_distribution import parameter_distribution, parameter_factor
 from probdmp.dmp.primitive import Primitive
 from probdmp.dmp.responses import GOAL, START_VELOCITY
 from probdmp.dmp.task import Task
@@ -25,8 +25,6 @@ __all__ = ["JointModel", "joint_model", "state_designs", "state_rows"]
 
 START = 0
 """Where p0 is in x; the parameters follow, each one place further than in theta."""
-ROUNDING = 1e-15
-"""Directions of x with less of its variance than this times their number are none."""
 TOLD_TOLERANCE = 1e-6
 """Standard deviation of a start velocity that was told, as a fraction of the range."""
 
@@ -112,12 +110,7 @@ def _start_and_parameters(primitive: Primitive) -> tuple[FloatArray, FloatArray]
     covariance[own, START, own, START_VELOCITY + 1] = primitive.start_covariances[:, 0, 1]
     covariance[own, START_VELOCITY + 1, own, START] = primitive.start_covariances[:, 0, 1]
     full = covariance.reshape(d * n, d * n)
-    stds = np.sqrt(np.diagonal(full))
-    stds = np.where(stds > 0, stds, 1.0)
-    eigenvalues, vectors = np.linalg.eigh(full / stds / stds[:, None])
-    kept = eigenvalues > ROUNDING * len(full) * max(float(eigenvalues[-1]), 1e-300)
-    factor = stds[:, None] * vectors[:, kept] * np.sqrt(eigenvalues[kept])
-    return mean, factor.reshape(d, n, -1)
+    return mean, parameter_factor(full).reshape(d, n, -1)
 
 
 def _told(

@@ -8,7 +8,10 @@ from probdmp.dmp.responses import GOAL, START_VELOCITY, WEIGHTS, parameter_respo
 from probdmp.dmp.transformation_system import POSITION
 from probdmp.dmp.variation import PathDistribution
 
-__all__ = ["parameter_distribution", "path_distribution"]
+__all__ = ["parameter_distribution", "parameter_factor", "path_distribution"]
+
+ROUNDING = 1e-15
+"""Directions with less of the variance than this times their number are none."""
 
 
 def parameter_distribution(primitive: Primitive) -> tuple[FloatArray, FloatArray]:
@@ -28,6 +31,15 @@ def parameter_distribution(primitive: Primitive) -> tuple[FloatArray, FloatArray
     covariance[own, START_VELOCITY, own, START_VELOCITY] = primitive.start_covariances[:, 0, 0]
     covariance[own, WEIGHTS, own, WEIGHTS] = primitive.weight_covariances
     return means.ravel(), covariance.reshape(d * n, d * n)
+
+
+def parameter_factor(covariance: FloatArray) -> FloatArray:
+    """F with F F^T = covariance, (n, r), r no larger than its rank; parameters may be of very different size."""
+    stds = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
+    stds = np.where(stds > 0, stds, 1.0)
+    eigenvalues, vectors = np.linalg.eigh(covariance / stds / stds[:, None])
+    kept = eigenvalues > ROUNDING * len(covariance) * max(float(eigenvalues[-1]), 0.0)
+    return np.asarray(stds[:, None] * vectors[:, kept] * np.sqrt(eigenvalues[kept]))
 
 
 def path_distribution(primitive: Primitive, n_phases: int) -> PathDistribution:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from probdmp.checks import FloatArray, check_array, check_choice, check_count, check_seconds
 from probdmp.demonstrations import Demonstration, Recording, Recordings, as_demonstrations
 from probdmp.detection import FailureDetector
-from probdmp.dmp import PUBLISHED, Configuration, Primitive, Task, task_for
+from probdmp.dmp import PUBLISHED, Configuration, Primitive, Task, ViaPoint, condition_primitive, task_for
 from probdmp.errors import InputError, InputTypeError, NotFittedError
 from probdmp.estimator.saving import write_learned
 from probdmp.execution import (
@@ -228,6 +228,17 @@ class ProbabilisticDMP:
             raise InputTypeError("random_state as a whole number >= 0 or a Generator", f"{random_state!r:.100}") from error
         return sample_trajectories(self._learned(), task, self._step(dt), count, rng, sensor_noise)
 
+    def condition(self, points: Sequence[ViaPoint]) -> Self:
+        """The same movement through via-points; needs `weight_uncertainty="joint"`.
+
+        Parameters
+        ----------
+        points : (time, position, std) each: seconds of the learned duration; (D,) array, data units, NaN for a degree of
+            freedom that is free; how far the movement may pass from it, a number or (D,) array, data units, > 0. Positions are
+            those of a movement from the learned start: from another one, it passes as much further on.
+        """
+        return self._with(condition_primitive(self._learned(), points))
+
     def with_sensor_noise(self, stds: ArrayLike) -> Self:
         """The same movement measured by other sensors; a detector has to be fitted to it anew.
 
@@ -239,9 +250,7 @@ class ProbabilisticDMP:
         checked = check_array(stds, "stds", (learned.n_dof,))
         if np.any(checked <= 0):
             raise InputError("stds > 0", f"{checked.min():g}")
-        other = type(self)(**self.get_params())
-        other.primitive_, other.fit_report_ = replace(learned, observation_variances=checked**2), None
-        return other
+        return self._with(replace(learned, observation_variances=checked**2))
 
     def save(self, path: str | Path, detector: FailureDetector | None = None) -> None:
         """Write a model file, atomically, with the detector if given."""
@@ -251,6 +260,11 @@ class ProbabilisticDMP:
         if not hasattr(self, "primitive_"):
             raise NotFittedError("a learned primitive", "one that was not fitted", "Call fit(demonstrations) first.")
         return self.primitive_
+
+    def _with(self, primitive: Primitive) -> Self:
+        other = type(self)(**self.get_params())
+        other.primitive_, other.fit_report_ = primitive, None
+        return other
 
     def _step(self, dt: float | None) -> float:
         return self._learned().dt if dt is None else check_seconds(dt, "dt")

@@ -28,7 +28,7 @@ SINGLE_STD = 0.1
 """How far executions are believed to stray, as a fraction of the range, where there is one demonstration only."""
 LEAST_STD = 1e-3
 """Least root mean square by which demonstrations differ, as a fraction of the range."""
-LEAST_RESIDUAL = 1e-4
+LEAST_RESIDUAL = 1e-5
 """Least standard deviation of the residual, as a fraction of the range."""
 GOAL_TOLERANCE = 1e-4
 """Standard deviation with which the end of a demonstration is its goal, as a fraction of the range."""

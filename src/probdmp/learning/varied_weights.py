@@ -7,8 +7,9 @@ import numpy as np
 
 from probdmp.demonstrations import Demonstration, positions_on_phases
 from probdmp.dmp import Primitive
-from probdmp.dmp.responses import GOAL, START_VELOCITY, WEIGHTS, parameter_responses
+from probdmp.dmp.responses import parameter_responses
 from probdmp.dmp.transformation_system import POSITION
+from probdmp.dmp.via_points import with_variation
 from probdmp.learning.hierarchical import estimate_variation
 
 __all__ = ["varied_weights"]
@@ -27,26 +28,15 @@ def varied_weights(still: Primitive, demonstrations: Sequence[Demonstration]) ->
     ----------
     still : the primitive to be, for its configuration, ranges and start.
     """
-    configuration, d = still.configuration, still.n_dof
+    configuration = still.configuration
     n_phases = min(round(1 / still.phase_step) + 1, MOST_PHASES[configuration.discretization])
     responses = parameter_responses(configuration, 1 / (n_phases - 1), n_phases)[:, POSITION]
     paths = positions_on_phases(demonstrations, n_phases)
     variation = estimate_variation(responses, paths - paths[:, :1], still.ranges)
-    n = configuration.n_basis + 2
-    blocks = variation.covariance.reshape(d, n, d, n)[np.arange(d), :, np.arange(d)]
-    weight_covariances = blocks[:, WEIGHTS, WEIGHTS]
-    start_covariances = np.array(still.start_covariances)
-    start_covariances[:, 0, 0] = blocks[:, START_VELOCITY, START_VELOCITY]
+    varied = with_variation(still, variation)
     return replace(
-        still,
-        weight_means=variation.means[:, WEIGHTS],
-        weight_covariances=weight_covariances,
-        weight_precisions=configuration.n_basis / np.trace(weight_covariances, axis1=-2, axis2=-1),
+        varied,
+        weight_precisions=configuration.n_basis / np.trace(varied.weight_covariances, axis1=-2, axis2=-1),
         forcing_precisions=LARGEST_PRECISION / (configuration.stiffness * still.ranges) ** 2,
         observation_variances=variation.residual_variances,
-        goal_displacements=variation.means[:, GOAL],
-        goal=still.start + variation.means[:, GOAL],
-        start_velocities=variation.means[:, START_VELOCITY],
-        start_covariances=start_covariances,
-        variation=variation,
     )

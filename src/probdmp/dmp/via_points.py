@@ -1,0 +1,96 @@
+"""A movement made to pass through points: its joint Gaussian conditioned on them.
+
+A via-point says y(t) = H(t) theta = position - start, up to its own noise, of every degree of freedom that it names. What the
+demonstrations say about the rest of the movement follows, by the same algebra as while executing.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from probdmp.checks import FloatArray, check_array, check_number
+from probdmp.dmp.path_distribution import parameter_distribution, parameter_factor
+from probdmp.dmp.primitive import Primitive
+from probdmp.dmp.responses import GOAL, START_VELOCITY, WEIGHTS, parameter_responses
+from probdmp.dmp.transformation_system import POSITION
+from probdmp.dmp.variation import Variation
+from probdmp.errors import InputError, InputTypeError
+from probdmp.gaussian import observe, unit_belief
+
+__all__ = ["ViaPoint", "condition_primitive", "with_variation"]
+
+ViaPoint = tuple[float, ArrayLike, ArrayLike]
+"""Time, seconds of the learned duration; position, (D,), data units, NaN where it is free; std, a number or (D,), data units."""
+
+
+def condition_primitive(primitive: Primitive, points: Sequence[ViaPoint]) -> Primitive:
+    """The movement that passes through points, started where it was learned to start.
+
+    Raises
+    ------
+    InputError, InputTypeError
+        If the weights are not joint, a time lies outside the movement, or a point is not one.
+    """
+    if primitive.configuration.weight_uncertainty != "joint":
+        raise InputError(
+            'weight_uncertainty="joint" to condition a movement',
+            f'"{primitive.configuration.weight_uncertainty}"',
+            'Learn it with ProbabilisticDMP(weight_model="hierarchical", weight_uncertainty="joint"): forcing terms that are '
+            "redrawn at every step say nothing about the rest of a movement.",
+        )
+    (mean, covariance), d = parameter_distribution(primitive), primitive.n_dof
+    factor = parameter_factor(covariance)
+    means, factors = mean.reshape(d, -1), factor.reshape(d, len(mean) // d, -1)
+    belief = unit_belief((), factor.shape[1])
+    for time, position, std in _checked(primitive, points):
+        row = _position_row(primitive, time)
+        belief = observe(belief, position - primitive.start - means @ row, row @ factors, std**2).belief
+    conditioned = factor @ belief.covariance @ factor.T
+    old = primitive.variation
+    residuals = primitive.observation_variances if old is None else old.residual_variances
+    shifted = (mean + factor @ belief.mean).reshape(d, -1)
+    return with_variation(primitive, Variation(shifted, (conditioned + conditioned.T) / 2, residuals))
+
+
+def with_variation(primitive: Primitive, variation: Variation) -> Primitive:
+    """The primitive with another Gaussian over its parameters, and what the independent model needs of it in its own fields."""
+    d, n = variation.means.shape
+    blocks = variation.covariance.reshape(d, n, d, n)[np.arange(d), :, np.arange(d)]
+    start_covariances = np.array(primitive.start_covariances)
+    start_covariances[:, 0, 0] = blocks[:, START_VELOCITY, START_VELOCITY]
+    return replace(
+        primitive,
+        weight_means=variation.means[:, WEIGHTS],
+        weight_covariances=blocks[:, WEIGHTS, WEIGHTS],
+        goal_displacements=variation.means[:, GOAL],
+        goal=primitive.start + variation.means[:, GOAL],
+        start_velocities=variation.means[:, START_VELOCITY],
+        start_covariances=start_covariances,
+        variation=variation,
+    )
+
+
+def _checked(primitive: Primitive, points: Sequence[ViaPoint]) -> list[tuple[float, FloatArray, FloatArray]]:
+    if not isinstance(points, list | tuple) or not all(isinstance(p, list | tuple) and len(p) == 3 for p in points):
+        raise InputTypeError("via-points as a list of (time, position, std)", f"{points!r:.100}")
+    shape, checked = (primitive.n_dof,), []
+    for given_time, given_position, given_std in points:
+        time = check_number(given_time, "the time of a via-point as a number of seconds")
+        if not 0 < time <= primitive.duration:
+            hint = "It counts from the start, in seconds of the learned duration; the start itself is a matter of the task."
+            raise InputError(f"0 < time <= {primitive.duration:g} s of a via-point", f"{time:g}", hint)
+        position = check_array(given_position, "the position of a via-point", shape, missing=True)
+        std = check_array(given_std, "the std of a via-point", shape if np.ndim(given_std) else ())
+        if np.any(std <= 0):
+            raise InputError("std > 0 of a via-point", f"{std.min():g}", "How far the movement may pass from it.")
+        checked.append((time, position, np.broadcast_to(std, shape)))
+    return checked
+
+
+def _position_row(primitive: Primitive, time: float) -> FloatArray:
+    """H of the position at a time, (N + 2,) array; on a straight line between two steps of the learned rate."""
+    at = time / primitive.dt
+    responses = parameter_responses(primitive.configuration, primitive.dt / primitive.duration, int(at) + 2)[-2:, POSITION]
+    return np.asarray((int(at) + 1 - at) * responses[0] + (at - int(at)) * responses[1])
