@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from safetensors.numpy import load, save
 
+from probdmp.dmp import Variation
 from probdmp.errors import InputError, InputTypeError, ModelFileError
 from probdmp.io import ModelContents, decode_model, encode_model, read_model, write_model
 
@@ -367,3 +368,57 @@ def test_huge_file_is_not_read(tmp_path):
         file.truncate(2**40)
     with pytest.raises(ModelFileError, match=r"of at most 200000000 bytes, got 1099511627776 bytes"):
         read_model(tmp_path / "m.probdmp")
+
+
+# --- variation --------------------------------------------------------------------------------------------------------
+
+
+def varied_model(make_primitive):
+    primitive = make_primitive(np.random.default_rng(0), 2, 3)
+    factor = np.random.default_rng(0).standard_normal((10, 10))
+    variation = Variation(factor[:2, :5], factor @ factor.T, np.array([0.1, 0.2]))
+    return ModelContents({"a": dataclasses.replace(primitive, variation=variation), "b": primitive}, {"a": {}, "b": {}})
+
+
+def test_the_variation_survives(make_primitive):
+    model = varied_model(make_primitive)
+    again = decode_model(encode_model(model), "m.probdmp").primitives
+    for name, array in model.primitives["a"].variation.arrays().items():
+        np.testing.assert_array_equal(getattr(again["a"].variation, name), array)
+    assert again["b"].variation is None
+    assert {label: p.identity for label, p in again.items()} == {label: p.identity for label, p in model.primitives.items()}
+
+
+def lost(metadata, tensors):
+    del tensors["0/variation/means"]
+
+
+def denied(metadata, tensors):
+    metadata["primitives"]["a"]["variation"] = False
+
+
+def claimed(metadata, tensors):
+    metadata["primitives"]["b"]["variation"] = True
+
+
+def misspelt(metadata, tensors):
+    metadata["primitives"]["b"]["variation"] = "no"
+
+
+def negative(metadata, tensors):
+    tensors["0/variation/covariance"] = -tensors["0/variation/covariance"]
+
+
+@pytest.mark.parametrize(
+    ("change", "match"),
+    [
+        (lost, "primitives with tensors"), (denied, "primitives with tensors"), (claimed, "primitives with tensors"),
+        (misspelt, "variation as true or false"), (negative, "covariance symmetric and positive semi-definite"),
+    ],
+)  # fmt: skip
+def test_a_variation_that_does_not_fit_is_refused(make_primitive, change, match):
+    payload = encode_model(varied_model(make_primitive))
+    metadata, tensors = metadata_of(payload), load(payload)
+    change(metadata, tensors)
+    with pytest.raises(ModelFileError, match=match):
+        decode_model(sealed(metadata, tensors), "m.probdmp")

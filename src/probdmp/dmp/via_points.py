@@ -22,7 +22,7 @@ from probdmp.gaussian import observe, unit_belief
 __all__ = ["ViaPoint", "condition_primitive", "with_variation"]
 
 ViaPoint = tuple[float, ArrayLike, ArrayLike]
-"""Time, seconds of the learned duration; position, (D,), data units, NaN where it is free; std, a number or (D,), data units."""
+"""Time, seconds of the learned duration; position, (D,), data units, NaN where free; std, a number or (D,), data units."""
 
 
 def condition_primitive(primitive: Primitive, points: Sequence[ViaPoint]) -> Primitive:
