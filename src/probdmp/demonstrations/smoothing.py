@@ -14,9 +14,13 @@ from probdmp.checks import FloatArray
 from probdmp.demonstrations.demonstration import Demonstration
 from probdmp.errors import InputError
 
-__all__ = ["SmoothPath", "noise_stds", "smooth_path"]
+__all__ = ["SmoothPath", "noise_stds", "smooth_path", "without_noise"]
 
 POLYNOMIAL_ORDER = 3
+DENOISING_WINDOW = 0.05
+"""Fraction of the recording over which `without_noise` averages."""
+SHORTEST_DENOISING_WINDOW = 7
+"""Samples; a cubic through fewer keeps half the noise."""
 
 
 class SmoothPath(NamedTuple):
@@ -73,6 +77,31 @@ def noise_stds(positions: FloatArray) -> FloatArray:
     fourth = np.abs(np.diff(positions, 4, axis=0))
     known = np.where(np.all(np.isnan(fourth), axis=0), 0.0, fourth)
     return np.asarray(np.nanmedian(known, axis=0) / 0.6745 / np.sqrt(70))
+
+
+def without_noise(positions: FloatArray) -> FloatArray:
+    """The path behind a recording of any quality, for simulation: gaps bridged along straight lines, then smoothed.
+
+    Parameters
+    ----------
+    positions : (T, D) array, data units; NaN where a sample is missing.
+
+    Returns
+    -------
+    (T, D) array, data units; NaN where a degree of freedom was never measured. Recordings too short to smooth keep their
+    noise.
+    """
+    from scipy.signal import savgol_filter
+
+    n_samples, path = len(positions), np.array(positions)
+    length = max(SHORTEST_DENOISING_WINDOW, 2 * int(DENOISING_WINDOW * n_samples / 2) + 1)
+    for column in path.T:
+        seen = np.flatnonzero(~np.isnan(column))
+        if len(seen):
+            column[:] = np.interp(np.arange(n_samples), seen, column[seen])
+            if length <= n_samples:
+                column[:] = savgol_filter(column, length, POLYNOMIAL_ORDER)
+    return path
 
 
 def _without_gaps(demonstration: Demonstration) -> FloatArray:
