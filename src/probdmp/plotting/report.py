@@ -70,7 +70,7 @@ def write_report(path: str | Path, evaluation: Evaluation, illustration: Illustr
     """
     experiment, document = evaluation.experiment, evaluation.as_dict()
     named = [("As published", published_summary())]
-    named += [(f"{r.forcing_noise}, {r.likelihood.replace('_', ' ')}", s) for r, s in evaluation.summaries().items()]
+    named += list(evaluation.summaries().items())
     page = PAGE.format(
         classes=document["classes"],
         train=experiment.train,
