@@ -192,6 +192,14 @@ def test_slow_without_noise_is_the_same_path():
     np.testing.assert_allclose(np.diff(faulty[100:, 0]), 0.5 * (t[1] - t[0]), rtol=1e-6)
 
 
+@pytest.mark.parametrize("fault", ["slow", "wrong_goal", "push", "drift"])
+def test_no_corners_give_a_movement_without_noise_away(fault):
+    """The largest fourth difference, by which noise is measured, hardly exceeds that of the movement itself."""
+    t = np.linspace(0, 3, 300)
+    path = np.column_stack([np.sin(2 * t), np.cos(3 * t)])
+    assert np.all(noise_stds(inject(fault, path, 150)[151:]) < 2 * noise_stds(path) + 1e-9)
+
+
 # --- displaced --------------------------------------------------------------------------------------------------------
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from probdmp.checks import FloatArray
 from probdmp.demonstrations.extent import largest_extent
-from probdmp.demonstrations.smoothing import noise_stds, without_noise
+from probdmp.demonstrations.smoothing import noise_stds, sampled_between, without_noise
 
 __all__ = ["drift", "hold", "hold_release", "push", "slow", "wrong_class", "wrong_goal"]
 
@@ -67,9 +67,8 @@ def slow(positions: FloatArray, onset: int, rng: np.random.Generator) -> FloatAr
     missing where the recorded one nearest to it is.
     """
     last = len(positions) - 1
-    instants = onset - 1 + SLOWED * np.arange(1, round((len(positions) - onset) / SLOWED) + 1)
-    path = without_noise(positions)
-    slowed = np.column_stack([np.interp(instants, np.arange(last + 1), column) for column in path.T])
+    instants = onset - 1 + SLOWED * np.arange(1.0, round((len(positions) - onset) / SLOWED) + 1)
+    slowed = sampled_between(without_noise(positions), instants)
     slowed += rng.standard_normal(slowed.shape) * noise_stds(positions)
     slowed[np.isnan(positions[np.minimum(np.round(instants).astype(int), last)])] = np.nan
     return np.concatenate([positions[:onset], slowed])

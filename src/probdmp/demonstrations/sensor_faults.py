@@ -4,7 +4,7 @@ import numpy as np
 
 from probdmp.checks import FloatArray
 from probdmp.demonstrations.extent import largest_extent
-from probdmp.demonstrations.smoothing import without_noise
+from probdmp.demonstrations.smoothing import sampled_between, without_noise
 
 __all__ = ["dropout", "jitter", "spikes", "stuck_sensor"]
 
@@ -55,8 +55,7 @@ def jitter(positions: FloatArray, onset: int, rng: np.random.Generator) -> Float
     nominal = np.arange(onset, len(positions), dtype=np.float64)
     instants = np.clip(nominal + rng.uniform(-0.5, 0.5, len(nominal)), 0, len(positions) - 1)
     moved, path = np.array(positions), without_noise(positions)
-    for d, column in enumerate(path.T):
-        moved[onset:, d] += np.interp(instants, np.arange(len(path)), column) - column[onset:]
+    moved[onset:] += sampled_between(path, instants) - path[onset:]
     return moved
 
 

@@ -14,7 +14,7 @@ from probdmp.checks import FloatArray
 from probdmp.demonstrations.demonstration import Demonstration
 from probdmp.errors import InputError
 
-__all__ = ["SmoothPath", "noise_stds", "smooth_path", "without_noise"]
+__all__ = ["SmoothPath", "noise_stds", "sampled_between", "smooth_path", "without_noise"]
 
 POLYNOMIAL_ORDER = 3
 DENOISING_WINDOW = 0.05
@@ -102,6 +102,24 @@ def without_noise(positions: FloatArray) -> FloatArray:
             if length <= n_samples:
                 column[:] = savgol_filter(column, length, POLYNOMIAL_ORDER)
     return path
+
+
+def sampled_between(path: FloatArray, instants: FloatArray) -> FloatArray:
+    """A path at instants between its samples, (T', D) array, by a cubic spline: straight lines would have visible corners.
+
+    Parameters
+    ----------
+    path : (T, D) array, data units; a column of NaN stays one.
+    instants : (T') array, in samples, 0 to T - 1.
+    """
+    from scipy.interpolate import make_interp_spline
+
+    n_samples, order = len(path), min(POLYNOMIAL_ORDER, len(path) - 1)
+    known = ~np.isnan(path).any(axis=0)
+    sampled = np.full((len(instants), path.shape[1]), np.nan)
+    if known.any():
+        sampled[:, known] = make_interp_spline(np.arange(n_samples), path[:, known], order)(instants)
+    return sampled
 
 
 def _without_gaps(demonstration: Demonstration) -> FloatArray:
