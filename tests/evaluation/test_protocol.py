@@ -15,6 +15,7 @@ from probdmp.evaluation import (
     Experiment,
     Finding,
     evaluate,
+    illustrate,
     learned_primitive,
     outcomes_of,
     summarize,
@@ -205,6 +206,14 @@ def test_the_paper_judges_every_fault(demos, experiment):
     assert all(list(o.findings) == ["undisturbed", *FAULTS] for o in outcomes)
     assert list(summarize(outcomes).faults) == list(FAULTS)
     json.dumps(evaluation.as_dict(), allow_nan=False)
+
+
+@pytest.mark.parametrize("fault", ["slow", "wrong_class", "dropout", "push:0.4"])
+def test_every_fault_can_be_illustrated(demos, experiment, fault):
+    shown = illustrate(demos, replace(experiment, faults=(fault,)), "v")
+    assert (shown.label, shown.fault) == ("v", fault)
+    assert len(shown.disturbed.statistic) == shown.disturbed.recording.n_samples
+    assert 0 <= shown.onset < shown.undisturbed.recording.duration
 
 
 # --- what is refused --------------------------------------------------------------------------------------------------

@@ -17,10 +17,8 @@ from probdmp.errors import InputError
 __all__ = ["SmoothPath", "noise_stds", "sampled_between", "smooth_path", "without_noise"]
 
 POLYNOMIAL_ORDER = 3
-DENOISING_WINDOW = 0.05
-"""Fraction of the recording over which `without_noise` averages."""
-SHORTEST_DENOISING_WINDOW = 7
-"""Samples; a cubic through fewer keeps half the noise."""
+DENOISING_WINDOW = 7
+"""Samples. A third of the noise variance is left; a longer window would cut the corners of letters by many times their noise."""
 
 
 class SmoothPath(NamedTuple):
@@ -80,7 +78,7 @@ def noise_stds(positions: FloatArray) -> FloatArray:
 
 
 def without_noise(positions: FloatArray) -> FloatArray:
-    """The path behind a recording of any quality, for simulation: gaps bridged along straight lines, then smoothed.
+    """The path behind a recording of any quality, for simulation: gaps bridged along straight lines, then barely smoothed.
 
     Parameters
     ----------
@@ -94,13 +92,12 @@ def without_noise(positions: FloatArray) -> FloatArray:
     from scipy.signal import savgol_filter
 
     n_samples, path = len(positions), np.array(positions)
-    length = max(SHORTEST_DENOISING_WINDOW, 2 * int(DENOISING_WINDOW * n_samples / 2) + 1)
     for column in path.T:
         seen = np.flatnonzero(~np.isnan(column))
         if len(seen):
             column[:] = np.interp(np.arange(n_samples), seen, column[seen])
-            if length <= n_samples:
-                column[:] = savgol_filter(column, length, POLYNOMIAL_ORDER)
+            if n_samples >= DENOISING_WINDOW:
+                column[:] = savgol_filter(column, DENOISING_WINDOW, POLYNOMIAL_ORDER)
     return path
 
 
