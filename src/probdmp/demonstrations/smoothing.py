@@ -18,7 +18,7 @@ __all__ = ["SmoothPath", "noise_stds", "sampled_between", "smooth_path", "withou
 
 POLYNOMIAL_ORDER = 3
 DENOISING_WINDOW = 7
-"""Samples. A third of the noise variance is left; a longer window would cut the corners of letters by many times their noise."""
+"""Samples. A third of the noise variance is left; a longer window would cut corners of letters by many times their noise."""
 
 
 class SmoothPath(NamedTuple):
