@@ -29,7 +29,8 @@ class Finding:
     alarm: float | None
     """Seconds since the start at which it was first called failed, if it was."""
     kind: str = ""
-    """What the alarm is about: `"motion"`, `"timing"` or `"sensor"`; nothing where the judge does not say."""
+    """What the alarm is about, such as `"motion"`, `"timing"` or `"sensor"`; nothing where the judge does not say. All but
+    `"sensor"` are about the movement."""
     trace: Trace | None = field(default=None, compare=False)
     """Where `Experiment.traces` asks for it."""
 
