@@ -10,7 +10,7 @@ from pathlib import Path
 
 from probdmp import Demonstration, read_demonstrations, synthetic_letters
 from probdmp.dmp import PUBLISHED, Configuration
-from probdmp.evaluation import READINGS, Evaluation, Experiment, Reading, Summary, evaluate
+from probdmp.evaluation import READINGS, Evaluation, Experiment, Summary, evaluate
 
 PAGE = Path(__file__).parent / "paper.md"
 RECORDINGS = Path(os.environ["PROBDMP_RECORDINGS"])
@@ -43,12 +43,8 @@ def title(name: str) -> str:
     return f"{name}, {len({d.label for d in demonstrations_of(name)})} × ({train} + {test})"
 
 
-def named(reading: Reading) -> str:
-    return f"{reading.forcing_noise}, {reading.likelihood.replace('_', ' ')}"
-
-
-def glance(results: dict[tuple[str, str, str], dict[Reading, Summary]]) -> Iterator[str]:
-    yield "| false alarms / ever / detected, % | " + " | ".join(map(named, READINGS)) + " |"
+def glance(results: dict[tuple[str, str, str], dict[str, Summary]]) -> Iterator[str]:
+    yield "| false alarms / ever / detected, % | " + " | ".join(reading.name for reading in READINGS) + " |"
     yield "|---|" + "---|" * len(READINGS)
     yield "| the paper, 22 × (10 + 10), reading not said | 0.9 / 100 / – |" + " |" * (len(READINGS) - 1)
     for name in DATA:
@@ -59,10 +55,10 @@ def glance(results: dict[tuple[str, str, str], dict[Reading, Summary]]) -> Itera
         yield f"| {title(name)} | " + " | ".join(cells) + " |"
 
 
-def seeds(evaluations: list[dict[Reading, Summary]]) -> Iterator[str]:
+def seeds(evaluations: list[dict[str, Summary]]) -> Iterator[str]:
     yield "| reading | false alarms | detected | ever |\n|---|---|---|---|"
     for reading in READINGS:
-        summaries = [evaluation[reading] for evaluation in evaluations]
+        summaries = [evaluation[reading.name] for evaluation in evaluations]
         columns = (
             [s.false_alarms for s in summaries],
             [s.faults["hold"].detected for s in summaries],
@@ -73,10 +69,10 @@ def seeds(evaluations: list[dict[Reading, Summary]]) -> Iterator[str]:
             known = [rate for rate in rates if rate is not None]
             share = 100 * sum(rate.count for rate in known) / sum(rate.n for rate in known)
             cells.append(", ".join(str(rate.count) for rate in known) + f" ({share:.1f} %)")
-        yield f"| {named(reading)} | " + " | ".join(cells) + " |"
+        yield f"| {reading.name} | " + " | ".join(cells) + " |"
 
 
-def full(results: dict[tuple[str, str, str], dict[Reading, Summary]]) -> Iterator[str]:
+def full(results: dict[tuple[str, str, str], dict[str, Summary]]) -> Iterator[str]:
     for name in DATA:
         n = next(iter(results[name, "published", "known"].values())).false_alarms.n
         yield f"**{title(name)}**: {n} undisturbed and {n} blocked executions. Counts, then % (95 % interval); latency in %"
@@ -94,7 +90,7 @@ def full(results: dict[tuple[str, str, str], dict[Reading, Summary]]) -> Iterato
                     latency = "–"
                     if hold.latency_median is not None and hold.latency_p95 is not None:
                         latency = f"{100 * hold.latency_median:.0f} / {100 * hold.latency_p95:.0f}"
-                    yield f"| {configuration} | {task} | {named(reading)} | " + " | ".join([*cells, latency]) + " |"
+                    yield f"| {configuration} | {task} | {reading} | " + " | ".join([*cells, latency]) + " |"
         yield ""
 
 

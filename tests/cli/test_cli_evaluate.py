@@ -5,12 +5,12 @@ import sys
 
 import pytest
 
+from probdmp import write_demonstrations
 from probdmp.cli.evaluation_table import print_evaluation
 from probdmp.demonstrations import FAULTS, synthetic_letters
 from probdmp.dmp import Configuration
-from probdmp.evaluation import READINGS, Evaluation, Experiment, Outcome
+from probdmp.evaluation import DETECTORS, READINGS, TASKS, Evaluation, Experiment, Finding, Outcome
 from probdmp.evaluation import evaluate as evaluate_directly
-from probdmp.evaluation.experiment import DETECTORS, TASKS
 
 SMALL = ("--train", 3, "--test", 3)
 
@@ -41,15 +41,56 @@ def test_the_table_has_the_papers_figures_and_every_reading(folder, run):
     assert len(table) == 1 + len(READINGS)
 
 
-def test_the_table_fits_into_eighty_columns(monkeypatch, capsys):
+def outcomes_with(faults):
+    """999 executions, of which all but one raise every alarm late."""
+
+    def outcome(label, alarm):
+        findings = {name: Finding(alarm, "motion" if alarm else "") for name in ("undisturbed", *faults)}
+        return Outcome(label, 1.0, dict.fromkeys(faults, 0.5), findings)
+
+    return [outcome("a", 0.99)] * 998 + [outcome("b", None)]
+
+
+@pytest.mark.parametrize("faults", [("hold",), (*FAULTS, "wrong_goal:0.15")])
+def test_the_table_fits_into_eighty_columns(monkeypatch, capsys, faults):
     monkeypatch.setenv("COLUMNS", "80")
-    outcomes = [Outcome("a", 1.0, 0.9, {"hold": 0.5}, {"hold": 0.99})] * 998 + [
-        Outcome("b", 1.0, None, {"hold": 0.5}, {"hold": None})
-    ]
-    print_evaluation(Evaluation(Experiment(), dict.fromkeys(READINGS, outcomes)))
-    table, _, _ = capsys.readouterr().out.partition("Second lines")
-    assert table.count("998/999 99.9 %") == 3 * len(READINGS)
+    split = dict.fromkeys([reading.name for reading in READINGS], outcomes_with(faults))
+    print_evaluation(Evaluation(Experiment(faults=faults), {0: split}))
+    table, _, _ = capsys.readouterr().out.partition("Intervals: 95 %, exact")
+    cells = 3 if faults == ("hold",) else 1 + 8 + 2  # false alarms, detected, ever; false alarms, eight failures, two benign
+    assert table.count("998/999 99.9 %") == cells * len(READINGS)
     assert max(map(len, table.splitlines())) <= 80
+
+
+def test_several_faults_have_a_row_each(folder, run):
+    faults = ("hold", "push:0.4", "jitter", "spikes")
+    result = run("evaluate", folder / "letters.npz", *SMALL, "--seeds", 2, "--fault", ",".join(faults), env={"COLUMNS": "80"})
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert "seeds 0 to 1" in result.stdout
+    assert "bootstrap over classes" in result.stdout
+    for reading in READINGS:
+        assert f"\n{reading.name}\nFalse alarms " in result.stdout
+    for words in (*faults, "false alarms", "called sensor"):
+        assert result.stdout.count(f" {words} ") == len(READINGS)
+
+
+def test_all_faults_and_some_more(folder, run_json):
+    document = run_json("evaluate", folder / "letters.npz", "--train", 2, "--test", 1, "--fault", "all, push:0.4,hold")
+    assert list(document["faults"]) == [*FAULTS, "push:0.4"]
+
+
+def test_another_movement_needs_another_class(folder, run, tmp_path, letters):
+    write_demonstrations(tmp_path / "c.npz", [d for d in letters if d.label == "c"])
+    result = run("evaluate", tmp_path / "c.npz", *SMALL, "--fault", "all")
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert "executions of another class" in result.stderr
+    assert "Leave wrong_class out" in result.stderr
+
+
+def test_several_seeds(folder, run_json, letters):
+    document = run_json("evaluate", folder / "letters.npz", *SMALL, "--seed", 5, "--seeds", 2)
+    assert document == as_json(evaluate_directly(letters, Experiment(3, 3, 5, seeds=2)))
+    assert [one["seed"] for one in document["per_seed"]] == [5, 6]
 
 
 def test_too_few_demonstrations_are_a_usage_error_that_names_the_classes(folder, run):
@@ -62,7 +103,10 @@ def test_too_few_demonstrations_are_a_usage_error_that_names_the_classes(folder,
 
 @pytest.mark.parametrize(
     "option",
-    [("--task", "x"), ("--detector", "x"), ("--fault", "x"), ("--fault", ""), ("--configuration", "x"), ("--train", 0)],
+    [
+        *(("--task", "x"), ("--detector", "x"), ("--configuration", "x"), ("--train", 0), ("--seeds", 0)),
+        *(("--fault", "x"), ("--fault", ""), ("--fault", "hold:0.3"), ("--fault", "push:big")),
+    ],
 )
 def test_unknown_choices_are_usage_errors(option, folder, run):
     assert run("evaluate", folder / "letters.npz", *option).exit_code == 2

@@ -1,11 +1,13 @@
 """Rates with exact intervals."""
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import beta
 
 from probdmp.evaluation import published_summary, rate_of
+from probdmp.evaluation.metrics import rate_over_classes
 
 
 @pytest.mark.parametrize(
@@ -58,3 +60,39 @@ def test_the_papers_own_figures():
     assert hold.ever.low >= 0.983
     assert hold.detected is None  # the paper gives neither onset nor latency
     assert (hold.latency_median, hold.latency_p95) == (None, None)
+
+
+# --- over classes -----------------------------------------------------------------------------------------------------
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+@given(seeds, st.integers(1, 12), st.integers(1, 20), st.integers(2, 5))
+def test_the_interval_over_classes_contains_the_rate(seed, n_classes, n_tests, n_splits):
+    rng = np.random.default_rng(seed)
+    labels = np.tile(np.repeat([f"{k}" for k in range(n_classes)], n_tests), n_splits)
+    happened = rng.random(len(labels)) < rng.random()
+    rate = rate_over_classes(happened, labels, n_splits)
+    assert (rate.count, rate.n, rate.rate) == (happened.sum(), len(labels), happened.mean())
+    assert 0 <= rate.low <= rate.rate <= rate.high <= 1
+    assert rate == rate_over_classes(happened, labels, n_splits)
+    order = rng.permutation(len(labels))
+    assert rate == rate_over_classes(happened[order], labels[order], n_splits)
+
+
+def test_the_bootstrap_is_that_of_scipy():
+    from scipy.stats import bootstrap
+
+    rng = np.random.default_rng(0)
+    by_class = rng.random((20, 50)) < rng.uniform(0, 0.4, (20, 1))
+    rate = rate_over_classes(by_class.ravel(), np.repeat(np.arange(20).astype(str), 50), 5)
+    theirs = bootstrap((by_class.mean(axis=1),), np.mean, n_resamples=20_000, method="percentile", rng=1).confidence_interval
+    assert (rate.low, rate.high) == pytest.approx(tuple(theirs), abs=0.01)
+
+
+@pytest.mark.parametrize("count", [0, 10])
+def test_classes_that_all_agree_leave_the_uncertainty_of_one_split(count):
+    labels = np.tile(np.repeat(["a", "b"], 5), 4)
+    rate, one = rate_over_classes([count > 0] * 40, labels, 4), rate_of(count, 10)
+    assert (rate.count, rate.n) == (4 * count, 40)
+    assert (rate.low, rate.high) == (one.low, one.high)

@@ -14,8 +14,17 @@ from scipy.stats import beta, binomtest
 from probdmp import ProbabilisticDMP, read_demonstrations, synthetic_letters
 from probdmp.dmp import PUBLISHED, Configuration
 from probdmp.errors import InputError
-from probdmp.evaluation import READINGS, Experiment, Reading, evaluate, published_summary, rate_of
-from probdmp.evaluation.experiment import ONSETS, commanded_tasks, draw_trial
+from probdmp.evaluation import (
+    READINGS,
+    Experiment,
+    Reading,
+    commanded_tasks,
+    draw_trials,
+    evaluate,
+    published_summary,
+    rate_of,
+)
+from probdmp.evaluation.trials import ONSETS
 from probdmp.learning import LearningOptions, fit_primitive
 
 CONFIGURATIONS = {"published": PUBLISHED, "default": Configuration()}
@@ -79,14 +88,14 @@ def test_training_and_test_demonstrations_are_different_ones():
     """ "We collected 10 training demonstrations and an additional 10 demonstrations for testing purposes." """
     members = synthetic_letters(20, letters="l")
     for seed in range(3):
-        trial = draw_trial("l", members, Experiment(seed=seed))
+        (trial,) = draw_trials(members, Experiment(seed=seed))
         assert (len(trial.training), len(trial.tests)) == (10, 10)
         assert len({id(d) for d in [*trial.training, *trial.tests]}) == 20
 
 
 def test_each_test_case_is_perturbed_by_blocking_it():
     """We perturb the simulated execution of each test case by artificially blocking it: at a random onset in 30 to 70 %."""
-    trial = draw_trial("l", synthetic_letters(20, letters="l"), Experiment())
+    (trial,) = draw_trials(synthetic_letters(20, letters="l"), Experiment())
     phases = []
     for test, faulty, onset in zip(trial.tests, trial.faulty["hold"], trial.onsets["hold"], strict=True):
         np.testing.assert_array_equal(faulty.positions[:onset], test.positions[:onset])
@@ -98,7 +107,7 @@ def test_each_test_case_is_perturbed_by_blocking_it():
 
 def test_a_blocked_execution_keeps_its_commanded_task():
     """It is judged against what it was told to do: the goal and duration of the undisturbed one, or those learned."""
-    trial = draw_trial("l", synthetic_letters(20, letters="l"), Experiment())
+    (trial,) = draw_trials(synthetic_letters(20, letters="l"), Experiment())
     primitive, _ = fit_primitive(trial.training, PUBLISHED, LearningOptions())
     for test, known, nominal in zip(
         trial.tests, *(commanded_tasks(primitive, trial.tests, task) for task in ("known", "nominal")), strict=True
@@ -120,8 +129,11 @@ def check_laws(demonstrations, experiment, n_classes):
     assert [(r["forcing_noise"], r["likelihood"]) for r in document["readings"]] == [
         (reading.forcing_noise, reading.likelihood) for reading in READINGS
     ]
-    for reading, summary in evaluation.summaries().items():
-        held, outcomes = summary.faults["hold"], evaluation.outcomes[reading]
+    summaries, outcomes_by_name = evaluation.summaries(), evaluation.outcomes
+    assert list(summaries) == [reading.name for reading in READINGS]
+    for reading in READINGS:
+        summary, outcomes = summaries[reading.name], outcomes_by_name[reading.name]
+        held = summary.faults["hold"]
         assert len(outcomes) == n
         assert set(Counter(o.label for o in outcomes).values()) == {experiment.test}
         for rate in (summary.false_alarms, held.detected, held.ever):

@@ -9,8 +9,7 @@ from paper.equations import ALPHA_X
 from probdmp import read_demonstrations, synthetic_letters
 from probdmp.dmp import PUBLISHED, Configuration
 from probdmp.dmp.forcing_term import forcing_term
-from probdmp.evaluation import READINGS, Experiment, evaluate
-from probdmp.evaluation.experiment import commanded_tasks, draw_trial, group_by_label
+from probdmp.evaluation import READINGS, Experiment, commanded_tasks, draw_trials, evaluate
 from probdmp.execution import filter_recordings, roll_out
 from probdmp.learning import LearningOptions, fit_primitive
 
@@ -21,9 +20,7 @@ POSTERIOR = Configuration(forcing_noise="posterior")
 @pytest.fixture(scope="module")
 def trials():
     """Three letters, 10 demonstrations to learn from and 5 to judge, each also blocked."""
-    experiment = Experiment(test=5)
-    groups = group_by_label(synthetic_letters(15, letters="alz"))
-    return [draw_trial(label, members, experiment) for label, members in groups.items()]
+    return draw_trials(synthetic_letters(15, letters="alz"), Experiment(test=5))
 
 
 def distances_from_the_blocked_place(trials, configuration):
@@ -93,9 +90,8 @@ def test_a_block_in_a_natural_dwell_is_missed(recordings):
     """
     demonstrations = read_demonstrations(recordings / "calinon_letters" / "letters.npz")
     experiment = Experiment(train=5, test=5)
-    outcomes = evaluate(demonstrations, experiment).outcomes[READINGS[0]]
-    trials = [draw_trial(label, members, experiment) for label, members in group_by_label(demonstrations).items()]
-    tests = [test for trial in trials for test in trial.tests]
+    outcomes = evaluate(demonstrations, experiment).outcomes[READINGS[0].name]
+    tests = [test for trial in draw_trials(demonstrations, experiment) for test in trial.tests]
     speeds, noticed = [], []
     for outcome, test in zip(outcomes, tests, strict=True):
         assert (outcome.label, outcome.duration) == (test.label, test.duration)

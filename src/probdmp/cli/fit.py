@@ -78,7 +78,7 @@ def fit(
     settings = _settings({"n_basis": n_basis, "smoothing": smoothing, **given}, published)
     from probdmp.detection import FailureDetector
     from probdmp.estimator import PrimitiveLibrary
-    from probdmp.evaluation.experiment import group_by_label
+    from probdmp.evaluation import group_by_label
 
     demonstrations = group_by_label(read_files(files, names_of(columns), label))
     library = PrimitiveLibrary(_learn(demonstrations, settings))

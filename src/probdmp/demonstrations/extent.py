@@ -8,7 +8,7 @@ from probdmp.checks import FloatArray
 from probdmp.demonstrations.demonstration import Demonstration
 from probdmp.errors import InputError
 
-__all__ = ["mean_ranges"]
+__all__ = ["largest_extent", "mean_ranges"]
 
 RANGES = (1e-40, 1e40)
 """Least and largest, data units: precisions and variances must stay finite."""
@@ -34,3 +34,14 @@ def mean_ranges(demonstrations: Sequence[Demonstration]) -> FloatArray:
         got = f"from {ranges.min():g} to {ranges.max():g}"
         raise InputError(f"movement over {RANGES[0]:g} to {RANGES[1]:g} units", got, "Rescale the data, to metres say.")
     return np.asarray(ranges)
+
+
+def largest_extent(positions: FloatArray) -> float:
+    """How far one recording reaches along the axis along which it reaches furthest, data units.
+
+    Parameters
+    ----------
+    positions : (T, D) array, data units; NaN where a sample is missing.
+    """
+    columns = [column[~np.isnan(column)] for column in positions.T]
+    return float(max((np.ptp(column) for column in columns if len(column)), default=0.0))

@@ -1,42 +1,114 @@
-"""What can go wrong with an execution, as seeded pure functions.
+"""What can go wrong with an execution, by name, and what a failure detector is expected to say of it."""
 
-A fault takes an execution, the sample at which it begins and a random generator, and returns the positions that would have
-been recorded. A faulty movement is still measured by the same sensor: its noise is drawn anew at the recording's own
-level, so that nothing can be detected merely because samples repeat exactly or because noise sets in.
-"""
-
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from probdmp.checks import FloatArray
-from probdmp.demonstrations.smoothing import noise_stds
+from probdmp.checks import FloatArray, check_choice
+from probdmp.demonstrations.movement_faults import drift, hold, hold_release, push, slow, wrong_class, wrong_goal
+from probdmp.demonstrations.sensor_faults import dropout, jitter, spikes, stuck_sensor
+from probdmp.errors import InputError, TooFewDemonstrationsError
 
-__all__ = ["FAULTS", "Fault", "hold"]
+__all__ = ["BENIGN", "FAILURE", "FAULTS", "SENSOR", "Fault", "fault_named"]
 
-Fault = Callable[[FloatArray, int, np.random.Generator], FloatArray]
-"""(positions (T, D), onset sample, generator) to positions (T, D)."""
+FAILURE = "failure"
+"""To be called failed."""
+BENIGN = "benign"
+"""The movement is fine: an alarm about motion or timing is a false alarm."""
+SENSOR = "sensor"
+"""The sensor is broken and the movement is not: to be called just that."""
 
 
-def hold(positions: FloatArray, onset: int, rng: np.random.Generator) -> FloatArray:
-    """Blocked from `onset` until the end: the paper's fault.
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """A seeded pure function of an execution, with its name and nature."""
 
-    Parameters
-    ----------
-    positions : (T, D) array, data units.
-    onset : first sample at which the movement no longer advances, 1 to T - 1.
+    name: str
+    """As `--fault` has it: with the size where one was asked for, such as `"push:0.4"`."""
+    inject: Callable[..., FloatArray]
+    """(positions, onset, rng), then the size or the other executions where it takes them."""
+    nature: str = FAILURE
+    """`FAILURE`, `BENIGN` or `SENSOR`."""
+    size: float | None = None
+    """Fraction of the range; None for faults without a size."""
+    takes_others: bool = False
+    """Whether it needs executions of other movements. Such a fault is there from the first sample on."""
 
-    Returns
-    -------
-    (T, D) array: as recorded before the onset, the last position measured, with sensor noise, from then on.
+    @property
+    def kind(self) -> str:
+        """The name without a size: faults of one kind that differ in size draw the same numbers."""
+        return self.name.partition(":")[0]
+
+    def __call__(
+        self, positions: FloatArray, onset: int, rng: np.random.Generator, others: Sequence[FloatArray] = ()
+    ) -> FloatArray:
+        """What would have been recorded.
+
+        Parameters
+        ----------
+        positions : (T, D) array, data units; NaN where a sample is missing.
+        onset : first sample with the fault, 1 to T - 1.
+        others : executions of other movements, (T', D) arrays at the same rate.
+
+        Returns
+        -------
+        (T', D) array, data units, new; before the onset as recorded. T' > T where the fault takes time.
+
+        Raises
+        ------
+        TooFewDemonstrationsError
+            If the fault needs executions of other movements and there are none.
+        """
+        if self.takes_others:
+            if not others:
+                raise TooFewDemonstrationsError(
+                    f"executions of another class with the same rate and degrees of freedom for the fault {self.name!r}",
+                    "one class alone",
+                    f"Leave {self.name} out, or add demonstrations of another class.",
+                )
+            return self.inject(positions, onset, rng, others)
+        return self.inject(positions, onset, rng) if self.size is None else self.inject(positions, onset, rng, self.size)
+
+
+FAULTS: dict[str, Fault] = {
+    fault.name: fault
+    for fault in (
+        Fault("hold", hold),
+        Fault("hold_release", hold_release),
+        Fault("slow", slow),
+        Fault("push", push, size=0.25),
+        Fault("drift", drift, size=0.3),
+        Fault("wrong_goal", wrong_goal, size=0.3),
+        Fault("wrong_class", wrong_class, takes_others=True),
+        Fault("dropout", dropout, BENIGN),
+        Fault("jitter", jitter, BENIGN),
+        Fault("stuck_sensor", stuck_sensor, SENSOR),
+        Fault("spikes", spikes, SENSOR),
+    )
+}
+"""By name."""
+
+
+def fault_named(name: str) -> Fault:
+    """A fault by its name, with another size than the usual one after a colon: `"push:0.4"` displaces by 40 % of the range.
+
+    Raises
+    ------
+    InputError, InputTypeError
+        If there is no such fault, it has no size, or the size is no number above 0.
     """
-    held = np.array(positions)
-    noise = rng.standard_normal(held[onset:].shape) * noise_stds(positions)
-    for d, column in enumerate(positions[:onset].T):
-        seen = column[~np.isnan(column)]
-        held[onset:, d] = (seen[-1] if len(seen) else np.nan) + noise[:, d]
-    return held
-
-
-FAULTS: dict[str, Fault] = {"hold": hold}
-"""By name, as given to `--fault`."""
+    kind, colon, text = str(name).partition(":")
+    fault = FAULTS[check_choice(kind, "fault", FAULTS)]
+    if not colon:
+        return fault
+    if fault.size is None:
+        sized = ", ".join(known.name for known in FAULTS.values() if known.size is not None)
+        raise InputError(f"fault {kind!r} without a size", repr(name), f"Only {sized} have one.")
+    try:
+        size = float(text)
+    except ValueError:
+        size = np.nan
+    if not 0 < size < np.inf:
+        raise InputError(f"the size of a fault as a fraction of the range above 0, such as {kind}:{fault.size}", repr(name))
+    return replace(fault, name=name, size=size)

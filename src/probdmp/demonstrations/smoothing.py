@@ -14,9 +14,11 @@ from probdmp.checks import FloatArray
 from probdmp.demonstrations.demonstration import Demonstration
 from probdmp.errors import InputError
 
-__all__ = ["SmoothPath", "noise_stds", "smooth_path"]
+__all__ = ["SmoothPath", "noise_stds", "sampled_between", "smooth_path", "without_noise"]
 
 POLYNOMIAL_ORDER = 3
+DENOISING_WINDOW = 7
+"""Samples. A third of the noise variance is left; a longer window would cut corners of letters by many times their noise."""
 
 
 class SmoothPath(NamedTuple):
@@ -73,6 +75,48 @@ def noise_stds(positions: FloatArray) -> FloatArray:
     fourth = np.abs(np.diff(positions, 4, axis=0))
     known = np.where(np.all(np.isnan(fourth), axis=0), 0.0, fourth)
     return np.asarray(np.nanmedian(known, axis=0) / 0.6745 / np.sqrt(70))
+
+
+def without_noise(positions: FloatArray) -> FloatArray:
+    """The path behind a recording of any quality, for simulation: gaps bridged along straight lines, then barely smoothed.
+
+    Parameters
+    ----------
+    positions : (T, D) array, data units; NaN where a sample is missing.
+
+    Returns
+    -------
+    (T, D) array, data units; NaN where a degree of freedom was never measured. Recordings too short to smooth keep their
+    noise.
+    """
+    from scipy.signal import savgol_filter
+
+    n_samples, path = len(positions), np.array(positions)
+    for column in path.T:
+        seen = np.flatnonzero(~np.isnan(column))
+        if len(seen):
+            column[:] = np.interp(np.arange(n_samples), seen, column[seen])
+            if n_samples >= DENOISING_WINDOW:
+                column[:] = savgol_filter(column, DENOISING_WINDOW, POLYNOMIAL_ORDER)
+    return path
+
+
+def sampled_between(path: FloatArray, instants: FloatArray) -> FloatArray:
+    """A path at instants between its samples, (T', D) array, by a cubic spline: straight lines would have visible corners.
+
+    Parameters
+    ----------
+    path : (T, D) array, data units; a column of NaN stays one.
+    instants : (T') array, in samples, 0 to T - 1.
+    """
+    from scipy.interpolate import make_interp_spline
+
+    n_samples, order = len(path), min(POLYNOMIAL_ORDER, len(path) - 1)
+    known = ~np.isnan(path).any(axis=0)
+    sampled = np.full((len(instants), path.shape[1]), np.nan)
+    if known.any():
+        sampled[:, known] = make_interp_spline(np.arange(n_samples), path[:, known], order)(instants)
+    return sampled
 
 
 def _without_gaps(demonstration: Demonstration) -> FloatArray:

@@ -1,21 +1,38 @@
-"""The paper's experiment on any labelled demonstrations: protocol, rates with intervals, latency."""
+"""The paper's experiment on any labelled demonstrations: protocol, judges, rates with intervals, latency."""
 
-from probdmp.evaluation.experiment import Evaluation, Experiment, evaluate
+from probdmp.evaluation.experiment import TASKS, Experiment
 from probdmp.evaluation.illustration import Illustration, illustrate
+from probdmp.evaluation.judges import DETECTORS, READINGS, Judge, Reading, learned_primitive
 from probdmp.evaluation.metrics import Rate, rate_of
-from probdmp.evaluation.outcomes import READINGS, Outcome, Reading, Summary, published_summary, summarize
+from probdmp.evaluation.outcomes import Finding, Outcome, Trace, outcomes_of
+from probdmp.evaluation.protocol import Evaluation, evaluate
+from probdmp.evaluation.summary import FaultSummary, Summary, published_summary, summarize
+from probdmp.evaluation.trials import UNDISTURBED, Trial, commanded_tasks, draw_trials, group_by_label
 
 __all__ = [
+    "DETECTORS",
     "READINGS",
+    "TASKS",
+    "UNDISTURBED",
     "Evaluation",
     "Experiment",
+    "FaultSummary",
+    "Finding",
     "Illustration",
+    "Judge",
     "Outcome",
     "Rate",
     "Reading",
     "Summary",
+    "Trace",
+    "Trial",
+    "commanded_tasks",
+    "draw_trials",
     "evaluate",
+    "group_by_label",
     "illustrate",
+    "learned_primitive",
+    "outcomes_of",
     "published_summary",
     "rate_of",
     "summarize",

@@ -1,7 +1,7 @@
 """One execution of the experiment in full: as recorded and with a fault, the paper's figure as data."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,10 +10,10 @@ from probdmp.demonstrations import Demonstration
 from probdmp.detection import FailureDetector, Verdict
 from probdmp.detection.monitoring import LikelihoodStatistic, replay
 from probdmp.dmp import Primitive, Task
-from probdmp.evaluation.experiment import Experiment, commanded_tasks, draw_trial, group_by_label
-from probdmp.evaluation.outcomes import READINGS
+from probdmp.evaluation.experiment import Experiment
+from probdmp.evaluation.judges import READINGS, fit_paper_detector
+from probdmp.evaluation.trials import commanded_tasks, draw_trials
 from probdmp.execution import GaussianTrajectory, roll_out
-from probdmp.learning import LearningOptions, fit_primitive
 
 __all__ = ["Illustration", "JudgedExecution", "illustrate"]
 
@@ -47,20 +47,16 @@ class Illustration:
 
 
 def illustrate(demonstrations: Sequence[Demonstration], experiment: Experiment, label: str | None = None) -> Illustration:
-    """Show one execution of an experiment, in the first reading and with the first fault.
+    """Show one execution of an experiment, in the first reading of the paper's rule and with the first fault.
 
     Parameters
     ----------
     label : class to show; the first unless given. Of its test executions the first is shown that is rightly judged both as
         recorded and with the fault, or the first of all if none is.
     """
-    classes = group_by_label(demonstrations)
-    label = next(iter(classes)) if label is None else label
-    trial, reading, fault = draw_trial(label, classes[label], experiment), READINGS[0], experiment.faults[0]
-    configuration = replace(experiment.configuration, forcing_noise=reading.forcing_noise)
-    primitive, _ = fit_primitive(trial.training, configuration, LearningOptions())
-    detector = FailureDetector(rule=experiment.detector, likelihood=reading.likelihood)
-    detector.fit(primitive, trial.training, tasks=commanded_tasks(primitive, trial.training, experiment.task))
+    trials, fault = {trial.label: trial for trial in draw_trials(demonstrations, experiment)}, experiment.faults[0]
+    trial = trials[next(iter(trials)) if label is None else label]
+    primitive, detector = fit_paper_detector(trial, READINGS[0], experiment)
     tasks = commanded_tasks(primitive, trial.tests, experiment.task)
     pairs = [
         (_judge(detector, primitive, task, test), _judge(detector, primitive, task, faulty))
@@ -69,7 +65,7 @@ def illustrate(demonstrations: Sequence[Demonstration], experiment: Experiment, 
     right = [not undisturbed.verdict.failed and disturbed.verdict.failed for undisturbed, disturbed in pairs]
     k = int(np.argmax(right))
     return Illustration(
-        label=label,
+        label=trial.label,
         primitive=primitive,
         training=trial.training,
         rollout=roll_out(primitive, tasks[k], trial.tests[k].dt),

@@ -1,92 +1,76 @@
-"""What came of each execution, and the figures made from it."""
+"""What judges say of each execution."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass, field
 
-import numpy as np
+from probdmp.checks import FloatArray, freeze_arrays
+from probdmp.evaluation.trials import UNDISTURBED, Trial
 
-from probdmp.evaluation.metrics import Rate, rate_of
+__all__ = ["Finding", "Outcome", "Trace", "outcomes_of"]
 
-__all__ = ["READINGS", "FaultSummary", "Outcome", "Reading", "Summary", "published_summary", "summarize"]
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trace:
+    """A statistic while an execution runs, for operating curves: at another threshold the first alarm is another."""
+
+    times: FloatArray
+    """(T,) array, seconds since the start."""
+    test_ratios: FloatArray
+    """(T,) array: statistic over threshold, above 1 for an alarm."""
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
-    """A way to understand what the paper leaves open."""
+class Finding:
+    """What a judge says of one execution."""
 
-    forcing_noise: str
-    """`"predictive"` or `"posterior"`; see `probdmp.dmp.forcing_term`."""
-    likelihood: str
-    """`"per_step"` or `"cumulative"`; see `probdmp.detection.statistics`."""
-
-
-READINGS = tuple(
-    Reading(noise, likelihood) for noise in ("predictive", "posterior") for likelihood in ("per_step", "cumulative")
-)
-"""All readings; the first is the one that `as_published` takes."""
+    alarm: float | None
+    """Seconds since the start at which it was first called failed, if it was."""
+    kind: str = ""
+    """What the alarm is about, such as `"motion"`, `"timing"` or `"sensor"`; nothing where the judge does not say. All but
+    `"sensor"` are about the movement."""
+    trace: Trace | None = field(default=None, compare=False)
+    """Where `Experiment.traces` asks for it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """One test execution, as recorded and with each fault; times in seconds."""
+    """One test execution, as recorded and with each fault."""
 
     label: str
     duration: float
-    false_alarm: float | None
-    """When the execution as recorded was called failed, if it was."""
+    """Seconds, as recorded."""
     onsets: Mapping[str, float]
-    """By fault: when it began."""
-    alarms: Mapping[str, float | None]
-    """By fault: when the faulty execution was called failed, if it was."""
+    """By fault: when it began, seconds."""
+    findings: Mapping[str, Finding]
+    """Of `UNDISTURBED` and of each fault."""
+
+    @property
+    def false_alarm(self) -> float | None:
+        """When the execution as recorded was called failed, if it was; seconds."""
+        return self.findings[UNDISTURBED].alarm
+
+    @property
+    def alarms(self) -> dict[str, float | None]:
+        """By fault: when the faulty execution was called failed, if it was; seconds."""
+        return {fault: self.findings[fault].alarm for fault in self.onsets}
 
 
-@dataclass(frozen=True, slots=True)
-class FaultSummary:
-    """How a fault fared."""
+def outcomes_of(trial: Trial, findings: Mapping[str, Sequence[Finding]]) -> list[Outcome]:
+    """One outcome for each test of a trial.
 
-    detected: Rate | None
-    """First alarm at or after the onset; an earlier alarm is a miss. None: not reported."""
-    ever: Rate
-    """Called failed at any time, as the paper counts."""
-    latency_median: float | None
-    """From onset to alarm, as a fraction of the duration; None when nothing was detected."""
-    latency_p95: float | None
-    latency_median_seconds: float | None
-
-
-@dataclass(frozen=True, slots=True)
-class Summary:
-    """The figures of the paper's table."""
-
-    false_alarms: Rate
-    faults: Mapping[str, FaultSummary]
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain values, for JSON."""
-        return {"false_alarms": asdict(self.false_alarms), "faults": {k: asdict(v) for k, v in self.faults.items()}}
-
-
-def published_summary() -> Summary:
-    """What the paper reports: 2 of 220 undisturbed executions called failed, 220 of 220 blocked ones; no latency."""
-    caught = rate_of(220, 220)
-    return Summary(rate_of(2, 220), {"hold": FaultSummary(None, caught, None, None, None)})
-
-
-def summarize(outcomes: Sequence[Outcome]) -> Summary:
-    """The figures over all executions."""
-    n = len(outcomes)
-    false_alarms = rate_of(sum(o.false_alarm is not None for o in outcomes), n)
-    return Summary(false_alarms, {fault: _summarize_fault(fault, outcomes) for fault in outcomes[0].onsets})
-
-
-def _summarize_fault(fault: str, outcomes: Sequence[Outcome]) -> FaultSummary:
-    alarmed = [(o, alarm) for o in outcomes if (alarm := o.alarms[fault]) is not None]
-    latencies = np.array([(alarm - o.onsets[fault], o.duration) for o, alarm in alarmed if alarm >= o.onsets[fault]])
-    ever, detected = rate_of(len(alarmed), len(outcomes)), rate_of(len(latencies), len(outcomes))
-    if not len(latencies):
-        return FaultSummary(detected, ever, None, None, None)
-    seconds, fractions = latencies[:, 0], latencies[:, 0] / latencies[:, 1]
-    return FaultSummary(
-        detected, ever, float(np.median(fractions)), float(np.quantile(fractions, 0.95)), float(np.median(seconds))
-    )
+    Parameters
+    ----------
+    findings : for each name in `trial.executions`, one for each execution.
+    """
+    return [
+        Outcome(
+            label=trial.label,
+            duration=test.duration,
+            onsets={fault: onsets[i] * test.dt for fault, onsets in trial.onsets.items()},
+            findings={name: findings[name][i] for name in trial.executions},
+        )
+        for i, test in enumerate(trial.tests)
+    ]

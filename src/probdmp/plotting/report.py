@@ -6,7 +6,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from probdmp.evaluation import Evaluation, Illustration, Rate, Summary, published_summary
+from probdmp.evaluation import Evaluation, FaultSummary, Illustration, Rate, Summary, published_summary
 from probdmp.io import write_atomically
 from probdmp.plotting.failure_detection import plot_judged_execution, plot_log_likelihoods
 from probdmp.plotting.style import figure_style
@@ -70,7 +70,7 @@ def write_report(path: str | Path, evaluation: Evaluation, illustration: Illustr
     """
     experiment, document = evaluation.experiment, evaluation.as_dict()
     named = [("As published", published_summary())]
-    named += [(f"{r.forcing_noise}, {r.likelihood.replace('_', ' ')}", s) for r, s in evaluation.summaries().items()]
+    named += list(evaluation.summaries().items())
     page = PAGE.format(
         classes=document["classes"],
         train=experiment.train,
@@ -130,12 +130,16 @@ def _svg(draw: Callable[[Illustration], "Figure"], illustration: Illustration) -
 
 
 def _row(name: str, summary: Summary, fault: str) -> str:
-    figures = summary.faults[fault]
-    latency = "–"
-    if figures.latency_median is not None and figures.latency_p95 is not None:
-        latency = f"{100 * figures.latency_median:.1f} / {100 * figures.latency_p95:.1f} %"
-    cells = [name, _rate(summary.false_alarms), _rate(figures.detected), _rate(figures.ever), latency]
+    figures = summary.faults.get(fault)
+    cells = [name, _rate(summary.false_alarms)]
+    cells += [_rate(figures.detected), _rate(figures.ever), _latency(figures)] if figures is not None else ["–"] * 3
     return "<tr>" + "".join(f"<td>{escape(cell)}" for cell in cells)
+
+
+def _latency(figures: FaultSummary) -> str:
+    if figures.latency_median is None or figures.latency_p95 is None:
+        return "–"
+    return f"{100 * figures.latency_median:.1f} / {100 * figures.latency_p95:.1f} %"
 
 
 def _rate(rate: Rate | None) -> str:

@@ -1,0 +1,99 @@
+"""Who decides whether an execution has failed.
+
+A judge is given the trials of all classes at once, so that it may learn from the training demonstrations of all of them, and
+returns an outcome for each test execution, trial by trial. It sees no test demonstration before it has made up its mind how to
+judge. `outcomes_of` puts its findings together.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+
+import numpy as np
+
+from probdmp.demonstrations import Demonstration
+from probdmp.detection import FailureDetector
+from probdmp.detection.monitoring import replay
+from probdmp.dmp import Configuration, Primitive, Task
+from probdmp.evaluation.experiment import Experiment
+from probdmp.evaluation.outcomes import Finding, Outcome, Trace, outcomes_of
+from probdmp.evaluation.trials import Trial, commanded_tasks
+from probdmp.learning import LearningOptions, fit_primitive
+
+__all__ = ["DETECTORS", "READINGS", "Judge", "Progress", "Reading", "fit_paper_detector", "learned_primitive"]
+
+Progress = Callable[[str], None]
+"""Called by a judge with its label after each class."""
+Judge = Callable[[Sequence[Trial], Experiment, Progress], list[Outcome]]
+"""(trials of one seed, the experiment with that seed, progress) to one outcome for each test, in the order of the trials."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """A way to understand what the paper leaves open."""
+
+    forcing_noise: str
+    """`"predictive"` or `"posterior"`; see `probdmp.dmp.forcing_term`."""
+    likelihood: str
+    """`"per_step"` or `"cumulative"`; see `probdmp.detection.statistics`."""
+
+    @property
+    def name(self) -> str:
+        """In words."""
+        return f"{self.forcing_noise}, {self.likelihood.replace('_', ' ')}"
+
+
+READINGS = tuple(
+    Reading(noise, likelihood) for noise in ("predictive", "posterior") for likelihood in ("per_step", "cumulative")
+)
+"""All readings; the first is the one that `as_published` takes."""
+
+
+def fit_paper_detector(trial: Trial, reading: Reading, experiment: Experiment) -> tuple[Primitive, FailureDetector]:
+    """Learn a class from its training demonstrations, and the paper's detector with the task knowledge of the experiment."""
+    primitive = learned_primitive(trial, replace(experiment.configuration, forcing_noise=reading.forcing_noise))
+    detector = FailureDetector(rule="paper", likelihood=reading.likelihood)
+    tasks = commanded_tasks(primitive, trial.training, experiment.task)
+    return primitive, detector.fit(primitive, trial.training, tasks=tasks)
+
+
+def learned_primitive(trial: Trial, configuration: Configuration) -> Primitive:
+    """The primitive that the training demonstrations teach; remembered, since several judges ask for the same."""
+    return _learned(tuple(trial.training), configuration)
+
+
+@lru_cache(maxsize=128)
+def _learned(training: tuple[Demonstration, ...], configuration: Configuration) -> Primitive:
+    return fit_primitive(training, configuration, LearningOptions())[0]
+
+
+def _judge_by_paper(reading: Reading, trials: Sequence[Trial], experiment: Experiment, on_class: Progress) -> list[Outcome]:
+    outcomes: list[Outcome] = []
+    for trial in trials:
+        primitive, detector = fit_paper_detector(trial, reading, experiment)
+        tasks = commanded_tasks(primitive, trial.tests, experiment.task)
+        findings = {
+            name: _findings(detector, primitive, tasks, executions, experiment.traces)
+            for name, executions in trial.executions.items()
+        }
+        outcomes += outcomes_of(trial, findings)
+        on_class(trial.label)
+    return outcomes
+
+
+def _findings(
+    detector: FailureDetector, primitive: Primitive, tasks: Sequence[Task], executions: Sequence[Demonstration], traces: bool
+) -> list[Finding]:
+    findings = []
+    for execution, ticks in zip(executions, replay(primitive, tasks, executions), strict=True):
+        monitor = detector.monitor(primitive)
+        ratios = np.array([monitor.update(observed) for observed in ticks])
+        alarm = monitor.verdict.time if monitor.verdict.failed else None
+        findings.append(Finding(alarm, trace=Trace(execution.times, ratios) if traces else None))
+    return findings
+
+
+DETECTORS: dict[str, Mapping[str, Judge]] = {
+    "paper": {reading.name: partial(_judge_by_paper, reading) for reading in READINGS},
+}
+"""By name, as given to `--detector`: its judges, the first of which stands for it."""
