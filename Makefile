@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test test-slow lint types figures results clean
+.PHONY: demo test test-slow lint types figures results variation clean
 
 demo: $(VENV)/.demo
 	$(BIN)/probdmp demo
@@ -28,6 +28,10 @@ figures: $(VENV)/.demo
 # Every table in docs/paper.md, from the recordings that PROBDMP_RECORDINGS points at; about ten minutes.
 results: $(VENV)/.demo
 	$(BIN)/python docs/results.py
+
+# The table in docs/variation.md, from the same recordings; about seven minutes.
+variation: $(VENV)/.demo
+	$(BIN)/python docs/variation.py
 
 clean:
 	rm -rf $(VENV) build src/*.egg-info report.html

@@ -390,8 +390,7 @@ def test_one_task_for_each_execution(models, detectors, letters, n_tasks):
 
 @pytest.mark.parametrize(
     ("name", "bad"),
-    [(name, bad) for name in ("goal", "duration") for bad in (np.nan, np.inf)]
-    + [("start", np.inf), ("start_velocity", np.inf)],
+    [("duration", np.nan), ("duration", np.inf), ("goal", np.inf), ("start", np.inf), ("start_velocity", np.inf)],
 )
 def test_tasks_made_by_hand_are_checked(name, bad):
     task = Task(np.zeros(2), np.ones(2), np.array(1.0))

@@ -456,3 +456,75 @@ def test_the_task_of_a_user(learned, letters):
     by_hand = Task(np.array(demo.positions[0]), np.array(demo.positions[-1]), np.array(demo.duration))
     own = task_for(learned.primitive_, demo.positions[0], demo.positions[-1], demo.duration)
     np.testing.assert_array_equal(learned.score_samples([demo], tasks=[by_hand]), learned.score_samples([demo], tasks=[own]))
+
+
+# --- variation --------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def varied(letters):
+    return ProbabilisticDMP(10, weight_model="hierarchical", weight_uncertainty="joint").fit(letters["s"])
+
+
+def test_every_method_takes_joint_weights(varied, letters):
+    demo = letters["s"][0]
+    for trajectory in (varied.rollout(), varied.track(demo), varied.smooth(demo)):
+        assert trajectory.covariances.shape == (len(trajectory.times), 2, 3, 3)
+        assert np.isfinite(trajectory.means).all()
+    assert varied.fit_report_.observation_noise is None
+    np.testing.assert_allclose(varied.score_samples([demo])[0], varied.track(demo).log_likelihoods.sum(), rtol=1e-9)
+    assert len(varied.sample(3, random_state=0)) == 3
+    e = varied.execute(demo.positions[0], demo.positions[-1], demo.duration, demo.dt)
+    errors = [np.abs(e.step(now).position - then).max() for now, then in zip(demo.positions, demo.positions[1:], strict=False)]
+    assert np.median(errors[5:]) < 0.02 * varied.primitive_.ranges.max()
+
+
+def test_what_was_seen_tells_about_the_rest(varied, letters):
+    """With joint weights the second half is known better after the first; with independent ones hardly."""
+    demo = letters["s"][2]
+    half = np.array(demo.positions)
+    half[len(half) // 2 :] = np.nan
+    alone, after = varied.rollout(demo.positions[0], duration=demo.duration, dt=demo.dt), varied.smooth(half, dt=demo.dt)
+    later = slice(len(half) // 2 + 3, -3)
+    assert np.median(after.position_stds[later] / alone.position_stds[later]) < 0.9
+
+
+def test_joint_weights_survive_a_file(varied, letters, tmp_path):
+    varied.save(tmp_path / "s.probdmp")
+    again = load(tmp_path / "s.probdmp")
+    assert again.get_params() == varied.get_params()
+    assert again.primitive_.identity == varied.primitive_.identity
+    assert_same_trajectory(again.rollout(), varied.rollout())
+    assert_same_trajectory(again.track(letters["s"][0]), varied.track(letters["s"][0]))
+
+
+def test_the_paper_stays_one_call_away(varied, letters):
+    """Hierarchical weights can be redrawn at every step, pooled ones be joint; only joint ones of a hierarchy are the rest."""
+    independent = ProbabilisticDMP(10, weight_model="hierarchical", weight_uncertainty="independent").fit(letters["s"])
+    np.testing.assert_allclose(independent.rollout().positions, varied.rollout().positions, atol=1e-9)
+    joint = ProbabilisticDMP(10, weight_model="pooled", weight_uncertainty="joint").fit(letters["s"])
+    assert joint.primitive_.variation is None
+    pooled = ProbabilisticDMP(10, weight_model="pooled", weight_uncertainty="independent").fit(letters["s"])
+    np.testing.assert_allclose(joint.rollout().positions, pooled.rollout().positions, atol=1e-9)
+    assert np.all(joint.primitive_.observation_variances > pooled.primitive_.observation_variances)
+
+
+def test_goals_far_outside_stay_sensible(varied):
+    """Three times as far as was shown: the movement leaves the learned one by about as much as its goal."""
+    p = varied.primitive_
+    learned, goal = varied.rollout(), p.start + 3 * (p.goal - p.start)
+    far = varied.rollout(goal=goal)
+    np.testing.assert_allclose(far.positions[-1], goal, atol=0.01 * p.ranges.max())
+    assert np.abs(far.positions - learned.positions).max() < 1.5 * np.abs(goal - p.goal).max()
+
+
+@pytest.mark.parametrize("handling", ["best", None])
+def test_a_handling_of_goals_that_is_none(letters, handling):
+    with pytest.raises(InputError, match="Expected goal_handling to be one of 'blend', 'condition', 'attractor'"):
+        ProbabilisticDMP(goal_handling=handling).fit(letters["s"])
+
+
+@pytest.mark.parametrize("setting", [{"weight_model": "hierarchical"}, {"weight_uncertainty": "joint"}])
+def test_the_papers_scaling_goes_with_the_papers_weights(letters, setting):
+    with pytest.raises(InputError, match='Expected scaling="none" with weight'):
+        ProbabilisticDMP(scaling="paper", **setting).fit(letters["s"])

@@ -253,6 +253,7 @@ def test_units_and_the_order_of_degrees_of_freedom_change_nothing():
     swapped = track_recording(turned, task_for(turned, goal=[0.2, 0.1]), Demonstration(observed[:, ::-1], DT))
     close(swapped.means[:, ::-1], one.means)
     close(swapped.log_likelihoods, one.log_likelihoods)
+    close(swapped.contributions[:, ::-1], one.contributions)
 
 
 # --- commanded goals --------------------------------------------------------------------------------------------------

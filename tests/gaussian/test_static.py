@@ -60,6 +60,14 @@ def test_a_sensor_that_says_nothing_changes_nothing():
     np.testing.assert_allclose(seen.innovation_covariance, 4.5)
 
 
+def test_independent_sensors_have_their_own_density():
+    seen = observe(unit_belief((), 2), np.array([1.0, -2.0]), np.diag([3.0, 0.5]), np.array([0.5, 0.2]))
+    alone = [
+        observe(unit_belief((), 1), np.array([o]), np.array([[g]]), np.array([r])) for o, g, r in ((1, 3, 0.5), (-2, 0.5, 0.2))
+    ]
+    np.testing.assert_allclose(seen.log_likelihoods, [a.log_likelihoods[0] for a in alone], rtol=1e-12)
+
+
 def test_moments_of_linear_functions():
     belief = Belief(np.array([1.0, -1.0]), np.array([[1.0, 0.5], [0.5, 2.0]]))
     mean, covariance = linear_moments(belief, np.array([[1.0, 1.0], [2.0, 0.0]]))

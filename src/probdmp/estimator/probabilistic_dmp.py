@@ -39,14 +39,19 @@ class ProbabilisticDMP:
     Parameters
     ----------
     n_basis : basis functions per degree of freedom.
-    weight_model : `"pooled"`: one set of weights behind all demonstrations (the paper).
-    weight_uncertainty : `"independent"`: the forcing term is redrawn at every step (the paper).
+    weight_model : `"pooled"`: one set of weights behind all demonstrations (the paper); `"hierarchical"`: each has its own,
+        drawn from a Gaussian over start velocity, goal and weights of all degrees of freedom that is learned.
+    weight_uncertainty : `"independent"`: the forcing term is redrawn at every step (the paper); `"joint"`: the weights are
+        constant and unknown, so that bands are those of whole executions and each observation tells about the rest.
     forcing_noise : `"predictive"`: single executions stray from the mean forcing term as the demonstrations do;
         `"posterior"`: only the mean itself is uncertain, and the sensor noise has to explain the spread.
     discretization : `"exact"` or `"semi_implicit_euler"` (the paper).
     scaling : `"none"` or `"paper"`: the forcing term grows with the distance from start to goal.
     alpha_z : spring constant of the transformation system, dimensionless.
     smoothing : window of the Savitzky-Golay filter as a fraction of a demonstration.
+    goal_handling : what a commanded goal does to joint weights. `"condition"`: the movement changes with its end as the
+        demonstrations say; `"attractor"`: all of it is drawn to the goal; `"blend"`: the former within their spread, the
+        latter beyond.
 
     Attributes
     ----------

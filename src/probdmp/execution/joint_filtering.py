@@ -36,7 +36,7 @@ class FilteredRecordings(NamedTuple):
     innovation_covariances: FloatArray
     """(T, N, D, 1, 1) array: of each degree of freedom by itself."""
     log_likelihoods: FloatArray
-    """(T, N, D) array, nats: of each degree of freedom given the past, with joint weights also given those before it."""
+    """(T, N, D) array, nats: the share of each degree of freedom in the log-likelihood of a time given the past."""
 
 
 class JointExecutions(NamedTuple):

@@ -11,11 +11,14 @@ variances: then nothing is lost in the difference but what rounding takes from o
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from probdmp.checks import FloatArray
 from probdmp.gaussian.density import LOG_2PI
 
 __all__ = ["Belief", "StaticUpdate", "linear_moments", "observe", "unit_belief"]
+
+BoolArray = NDArray[np.bool_]
 
 
 class Belief(NamedTuple):
@@ -36,7 +39,7 @@ class StaticUpdate(NamedTuple):
     innovation_covariance: FloatArray
     """S, (*batch, O, O), whether seen or not."""
     log_likelihoods: FloatArray
-    """(*batch, O), nats: density of each sensor given the past and the sensors before it; 0 where not seen."""
+    """(*batch, O), nats: share of each sensor in the log density given the past, 0 where not seen; see `_shares`."""
 
 
 def unit_belief(batch: tuple[int, ...], size: int) -> Belief:
@@ -59,17 +62,29 @@ def observe(belief: Belief, observation: FloatArray, design: FloatArray, varianc
     covariance = design @ spread + variances[..., None] * np.eye(design.shape[-2])
     # A sensor that was not seen is one of unit variance that has to do with nothing: no gain, no density.
     both = seen[..., :, None] & seen[..., None, :]
-    cholesky = np.linalg.cholesky(np.where(both, covariance, np.eye(seen.shape[-1])))
+    known = np.where(both, covariance, np.eye(seen.shape[-1]))
+    cholesky = np.linalg.cholesky(known)
     whitening = np.linalg.inv(cholesky)
-    white = np.matmul(whitening, np.where(seen, innovation, 0.0)[..., None])
+    residual = np.where(seen, innovation, 0.0)
+    white = np.matmul(whitening, residual[..., None])
     gain = np.where(seen[..., None, :], spread, 0.0) @ whitening.mT
-    log_scales = np.log(np.diagonal(cholesky, axis1=-2, axis2=-1))
+    log_determinant = 2 * np.sum(np.log(np.diagonal(cholesky, axis1=-2, axis2=-1)), axis=-1)
     return StaticUpdate(
         Belief(belief.mean + np.matmul(gain, white)[..., 0], belief.covariance - gain @ gain.mT),
         innovation,
         covariance,
-        np.where(seen, -0.5 * (white[..., 0] ** 2 + LOG_2PI) - log_scales, 0.0),
+        _shares(residual * np.matmul(whitening.mT, white)[..., 0], known, log_determinant, seen),
     )
+
+
+def _shares(distances: FloatArray, covariance: FloatArray, log_determinant: FloatArray, seen: BoolArray) -> FloatArray:
+    """ln N(e; 0, S), one share for each sensor: e_i (S^-1 e)_i, ln S_ii, and of what correlation adds to ln |S| equal parts.
+
+    Independent sensors get their own density, whatever their order.
+    """
+    log_variances = np.log(np.diagonal(covariance, axis1=-2, axis2=-1))
+    correlation = (log_determinant - log_variances.sum(axis=-1)) / np.maximum(seen.sum(axis=-1), 1)
+    return np.where(seen, -0.5 * (distances + LOG_2PI + log_variances + correlation[..., None]), 0.0)
 
 
 def linear_moments(belief: Belief, design: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -1,0 +1,109 @@
+"""From the values of several channels to one surprise, and from a false-alarm rate to its threshold.
+
+    of each calibration execution i and channel c the largest value x_ic over its whole length
+    surprise of a value a in channel c   L_c(a) = -ln (share of executions that ever reach a),
+                                         by rank up to the 90 % quantile u, beyond it by a Pareto tail: ln(a / u) / z more
+    statistic                            T[t] = max_c L_c(a_c[t])
+    threshold                            h with a share alpha of executions whose largest T_i exceeds it
+
+alpha counts executions, not ticks. With alpha (n + 1) >= 5 the threshold is an order statistic of the n values T_i
+(conformal); below that it lies on an exponential tail fitted to those above their 80 % quantile. n executions can show no
+rate below 1 / (n + 1).
+Sources: Vovk, Gammerman & Shafer, Algorithmic Learning in a Random World; Hill, Annals of Statistics 3 (1975).
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+
+from probdmp.checks import FloatArray
+from probdmp.errors import InputError
+
+__all__ = ["CALIBRATIONS", "Calibration"]
+
+CALIBRATIONS = ("leave_one_out", "held_out")
+TAIL_SHARE = 0.1
+"""Of the executions, in the tail of each channel."""
+TAIL_PRIOR = 0.1
+"""Exponent z of one execution that is taken to lie in the tail of every channel beside those that do."""
+STATISTIC_TAIL_SHARE = 0.2
+ENOUGH = 5.0
+"""Calibration executions expected above a threshold that is one of them."""
+SUSPECT = 0.1
+"""A primitive is flagged where chance alone would give it so many values above the threshold less often than this."""
+
+
+class Calibration:
+    """What is normal for a library of primitives, at one false-alarm rate.
+
+    Parameters
+    ----------
+    maxima : (n, C) array: largest value of every channel over each calibration execution; NaN where there was no evidence.
+    labels : (n) which primitive each execution was of.
+    false_alarm_rate : alpha, of executions, in (0, 1).
+    method : a name from `CALIBRATIONS`: where the executions come from.
+    """
+
+    def __init__(self, maxima: FloatArray, labels: Sequence[str], false_alarm_rate: float, method: str) -> None:
+        self.maxima, self.labels = np.nan_to_num(maxima), tuple(labels)
+        self.false_alarm_rate, self.method = false_alarm_rate, method
+        if len(self.maxima) < 2 or len(self.maxima) != len(self.labels):
+            raise InputError("at least two calibration executions, each with a label", f"{len(self.maxima)}")
+        self._sorted = np.sort(self.maxima, axis=0)
+        self._starts = np.maximum(np.quantile(self.maxima, 1 - TAIL_SHARE, axis=0), np.finfo(float).tiny)
+        beyond = self.maxima > self._starts
+        excesses = np.where(beyond, np.log(np.maximum(self.maxima, self._starts) / self._starts), 0.0)
+        self._exponents = (excesses.sum(axis=0) + TAIL_PRIOR) / (beyond.sum(axis=0) + 1)
+        self._tail_surprises = -np.log((beyond.sum(axis=0) + 1) / (self.n + 1))
+        self.statistics = self.surprise(self.maxima).max(axis=-1)
+        self.threshold, self.is_conformal = self._threshold()
+
+    @property
+    def n(self) -> int:
+        """Calibration executions."""
+        return len(self.maxima)
+
+    @property
+    def attainable_rate(self) -> float:
+        """Least false-alarm rate that n executions can vouch for, 1 / (n + 1)."""
+        return 1 / (self.n + 1)
+
+    @property
+    def guarantee(self) -> str:
+        """How far the false-alarm rate may be trusted, in words."""
+        if self.false_alarm_rate < self.attainable_rate:
+            return "model-based, not guaranteed"
+        if self.method == "leave_one_out":
+            return "empirical"
+        return "conformal" if self.is_conformal else "model-based, not guaranteed"
+
+    @cached_property
+    def suspects(self) -> dict[str, float]:
+        """Primitives that raise more alarms than they should: label to the share of their calibration executions."""
+        from scipy.stats import binom
+
+        alarms = Counter(label for label, t in zip(self.labels, self.statistics, strict=True) if t > self.threshold)
+        counts = Counter(self.labels)
+        chance = {label: binom.sf(k - 1, counts[label], self.false_alarm_rate) for label, k in alarms.items()}
+        return {label: alarms[label] / counts[label] for label in sorted(alarms) if chance[label] < SUSPECT}
+
+    def surprise(self, values: FloatArray) -> FloatArray:
+        """-ln of the share of normal executions that ever reach values (…, C), channel by channel; no evidence is no surprise."""
+        filled = np.nan_to_num(np.asarray(values, dtype=np.float64))
+        ranks = np.stack(
+            [self.n - np.searchsorted(column, filled[..., c], "left") for c, column in enumerate(self._sorted.T)], axis=-1
+        )
+        by_rank = np.minimum(-np.log((ranks + 1) / (self.n + 1)), self._tail_surprises)
+        tail = np.log(np.maximum(filled, self._starts) / self._starts) / self._exponents
+        return np.where(filled > self._starts, self._tail_surprises + tail, by_rank)
+
+    def _threshold(self) -> tuple[float, bool]:
+        alpha, ordered = self.false_alarm_rate, np.sort(self.statistics)
+        if alpha * (self.n + 1) >= ENOUGH:
+            return float(ordered[int(np.ceil((self.n + 1) * (1 - alpha))) - 1]), True
+        start = float(np.quantile(ordered, 1 - STATISTIC_TAIL_SHARE))
+        excesses = ordered[ordered > start] - start
+        scale = (excesses.sum() + 1.0) / (len(excesses) + 1)  # were the channels one, T would be exponential with scale 1
+        return max(start + scale * float(np.log(STATISTIC_TAIL_SHARE / alpha)), np.finfo(float).tiny), False

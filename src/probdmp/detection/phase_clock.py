@@ -1,0 +1,83 @@
+"""From samples at any rate to ticks of one hundredth of the movement.
+
+Statistics of the trajectory are evaluated at the ticks, so what they say does not depend on the control rate. Between samples
+the path is taken for straight. A tick waits for the first sample after it; where a sensor is silent for longer than
+`LONGEST_GAP` around a tick, the tick goes on without it, as NaN.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from probdmp.checks import FloatArray
+
+__all__ = ["TICKS", "PhaseClock", "Tick"]
+
+TICKS = 100
+"""Ticks in a movement, hence TICKS + 1 phases from its start to its end."""
+LONGEST_GAP = 3.0
+"""Ticks between two samples across which the path is taken for straight; at least two and a half samples."""
+ROUNDING = 1e-6
+
+
+class Tick(NamedTuple):
+    """The movement at one tick."""
+
+    index: int
+    """Ticks since the start; beyond `TICKS` once the movement should be over."""
+    values: FloatArray
+    """(D,) array, as given to the clock; NaN where nothing was seen around the tick."""
+
+
+class PhaseClock:
+    """Turns the samples of one execution into ticks.
+
+    Parameters
+    ----------
+    n_dof : D.
+    duration, dt : seconds, of the movement and between samples.
+    """
+
+    def __init__(self, n_dof: int, duration: float, dt: float) -> None:
+        self._rate = TICKS / duration
+        self._longest_gap = max(LONGEST_GAP, 2.5 * dt * self._rate)
+        self._last_times = np.full(n_dof, -np.inf)
+        self._last_values = np.full(n_dof, np.nan)
+        self._pending: list[Tick] = []
+        self._next = 0
+
+    def advance(self, time: float, values: FloatArray) -> list[Tick]:
+        """Take in a sample; returns the ticks that are complete now, or that have waited long enough.
+
+        Parameters
+        ----------
+        time : seconds since the start, not before the last one.
+        values : (D,) array, any unit; NaN where nothing was measured.
+        """
+        now = time * self._rate
+        while self._next <= now + ROUNDING:
+            self._pending.append(Tick(self._next, np.full(len(values), np.nan)))
+            self._next += 1
+        seen = ~np.isnan(values)
+        if self._pending and seen.any():
+            self._fill(now, values, seen)
+        self._last_times = np.where(seen, now, self._last_times)
+        self._last_values = np.where(seen, values, self._last_values)
+        ready = 0
+        for tick in self._pending:
+            if np.isnan(tick.values).any() and now - tick.index < self._longest_gap:
+                break
+            ready += 1
+        done, self._pending = self._pending[:ready], self._pending[ready:]
+        return done
+
+    def _fill(self, now: float, values: FloatArray, seen: FloatArray) -> None:
+        """Straight lines from the last sample to this one, over the ticks between them."""
+        gaps = now - self._last_times
+        near = seen & (gaps <= self._longest_gap)
+        slopes = np.where(near, (values - self._last_values) / np.maximum(gaps, ROUNDING), 0.0)
+        for tick in self._pending:
+            here = seen & (np.abs(now - tick.index) <= ROUNDING)
+            reached = here | (near & (self._last_times <= tick.index + ROUNDING))
+            fill = reached & np.isnan(tick.values)
+            tick.values[fill] = (values - np.where(here, 0.0, slopes * (now - tick.index)))[fill]

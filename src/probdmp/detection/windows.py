@@ -1,0 +1,121 @@
+"""How far several moments of an execution, taken together, lie from the Gaussian over its path.
+
+A window is the path at a few ticks around a place, or differences between them. An execution may run a little ahead of the
+mean movement or behind it, so a window is compared with the model at the same place and at several shifts of it. All
+covariances are factorised once: Sigma_window + R = L L^T, and z = L^-1 (window - mean) is white. Points come in order of time,
+so the first entries of z say how likely the beginning of a window is, whatever follows.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from probdmp.checks import FloatArray
+from probdmp.detection.path_model import PathModel
+from probdmp.detection.phase_clock import TICKS
+
+__all__ = ["PathWindows", "WhiteWindows", "gather"]
+
+
+class WhiteWindows(NamedTuple):
+    """Windows as white noise; all arrays (n, T, S, L): executions, places, shifts, points of the window."""
+
+    squares: FloatArray
+    """Squared Mahalanobis distance of the points up to each one."""
+    log_determinants: FloatArray
+    """ln det L^-1 of the points up to each one."""
+    counts: FloatArray
+    """How many numbers were seen up to each one."""
+
+
+def gather(paths: FloatArray, places: FloatArray, offsets: FloatArray) -> FloatArray:
+    """Paths (n, T, D) at ticks places + offsets: (n, places, offsets, D). Before the start a movement is where it starts."""
+    return paths[:, np.clip(places[:, None] + offsets, 0, paths.shape[1] - 1)]
+
+
+class PathWindows:
+    """Windows of one shape at every place of a movement.
+
+    Parameters
+    ----------
+    model : the Gaussian over paths.
+    offsets : (P,) ticks of the points, relative to the place.
+    shifts : (S,) ticks by which an execution may be ahead.
+    n_places : places 0, 1, …; a later one is judged as the last.
+    combination : (L, P) array, from points to what is compared; the points themselves unless given.
+    """
+
+    def __init__(
+        self, model: PathModel, offsets: FloatArray, shifts: FloatArray, n_places: int, combination: FloatArray | None = None
+    ) -> None:
+        self.offsets, self.shifts = np.asarray(offsets), np.asarray(shifts)
+        self._combination = np.eye(len(self.offsets)) if combination is None else combination
+        ticks = np.arange(n_places)[:, None, None] + self.offsets
+        # Before the start there is no tempo: (T, S, P)
+        self._ticks = np.where(ticks <= 0, 0, np.clip(ticks + self.shifts[:, None], 0, TICKS))
+        points, dof = len(self._combination), model.means.shape[1]
+        self._shape = (points, dof)
+        whole = model.covariance.transpose(0, 2, 1, 3)  # (M, M, D, D)
+        blocks = whole[self._ticks[..., :, None], self._ticks[..., None, :]]  # (T, S, P, P, D, D)
+        mixed = np.einsum("lp,tspqde,kq->tsldke", self._combination, blocks, self._combination, optimize=True)
+        noise = np.kron(self._combination @ self._combination.T, np.diag(model.noise_variances))
+        self._covariances = mixed.reshape(*mixed.shape[:2], points * dof, points * dof) + noise
+        self._whitening = np.linalg.inv(np.linalg.cholesky(self._covariances))
+
+    def whiten(self, places: FloatArray, windows: FloatArray, means: FloatArray) -> WhiteWindows:
+        """Compare windows with the model.
+
+        Parameters
+        ----------
+        places : (T,) ticks.
+        windows : (n, T, P, D) array of displacements; NaN where nothing was seen. Where points are compared and not differences,
+            the first few suffice.
+        means : (n, M, D) array, mean paths of the executions.
+        """
+        rows = np.minimum(places, len(self._ticks) - 1)
+        residuals = self._residuals(rows, windows, means)
+        points, dof = residuals.shape[-2:]
+        flat, size = residuals.reshape(*residuals.shape[:3], -1), points * dof
+        whitening = self._whitening[rows][..., :size, :size]
+        # (T, S, n, size): matrix products are far faster than sums over indices
+        white = np.moveaxis(np.matmul(whitening, np.moveaxis(np.nan_to_num(flat), 0, -1)), -1, 0)
+        diagonal = np.broadcast_to(np.log(np.diagonal(whitening, axis1=-2, axis2=-1)), flat.shape).copy()
+        seen = ~np.isnan(flat)
+        for n, t in np.argwhere(~seen.all(axis=(2, 3))):
+            white[n, t], diagonal[n, t] = self._without_unseen(rows[t], flat[n, t], size)
+        shape = (*flat.shape[:3], points, dof)
+        sums = [np.cumsum(x.reshape(shape).sum(axis=-1), axis=-1) for x in (white**2, diagonal, seen)]
+        return WhiteWindows(*sums)
+
+    def contributions(self, place: int, shift: int, window: FloatArray, mean: FloatArray) -> FloatArray:
+        """(D,) array: signed share of each degree of freedom in the squared distance of one window, (P, D).
+
+        The sign is that of the deviation of the last point; the magnitudes add up to the squared distance, or nearly so where
+        shares of different signs cancel.
+        """
+        rows = np.minimum(np.array([place]), len(self._ticks) - 1)
+        residuals = np.nan_to_num(self._residuals(rows, window[None, None], mean[None])[0, 0, shift])
+        size = residuals.size
+        whitening = self._whitening[rows[0], shift, :size, :size]
+        weighed = (whitening.T @ (whitening @ residuals.ravel())).reshape(residuals.shape)
+        return np.abs((residuals * weighed).sum(axis=0)) * np.sign(residuals[-1])
+
+    def _residuals(self, rows: FloatArray, windows: FloatArray, means: FloatArray) -> FloatArray:
+        """What is compared minus its mean at each shift, (n, T, S, L, D)."""
+        points = windows.shape[2]
+        combination = self._combination if points == len(self.offsets) else np.eye(points)
+        deviations = windows[:, :, None] - means[:, self._ticks[rows][..., :points]]  # (n, T, S, P, D)
+        if not np.isnan(windows).any():
+            return np.asarray(np.matmul(combination, deviations))
+        unseen = np.matmul(np.abs(combination), np.isnan(deviations)) > 0
+        return np.where(unseen, np.nan, np.matmul(combination, np.nan_to_num(deviations)))
+
+    def _without_unseen(self, row: int, residuals: FloatArray, size: int) -> tuple[FloatArray, FloatArray]:
+        """What was seen of a window whitened by itself: z and the logarithms of the diagonal, (S, size), zero elsewhere."""
+        seen = ~np.isnan(residuals[0])
+        white, diagonal = np.zeros((2, len(self.shifts), size))
+        if seen.any():
+            inverse = np.linalg.inv(np.linalg.cholesky(self._covariances[row][:, :size, :size][:, seen][:, :, seen]))
+            white[:, seen] = np.matmul(inverse, residuals[:, seen][..., None])[..., 0]
+            diagonal[:, seen] = np.log(np.diagonal(inverse, axis1=-2, axis2=-1))
+        return white, diagonal
