@@ -1,5 +1,6 @@
 """A recorded movement as checked data."""
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -94,6 +95,11 @@ class Demonstration:
     def has_names(self) -> bool:
         """Whether the degrees of freedom were given names; bare arrays fit any."""
         return self.names != _default_names(self.n_dof)
+
+    @property
+    def fingerprint(self) -> str:
+        """SHA-256 of positions and dt, by which a recording is known again."""
+        return hashlib.sha256(np.float64(self.dt).tobytes() + self.positions.tobytes()).hexdigest()
 
     @property
     def n_samples(self) -> int:

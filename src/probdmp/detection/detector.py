@@ -1,31 +1,27 @@
-"""Failure detectors: a statistic and a threshold for each primitive, the same online and over recordings."""
+"""Failure detectors: what is normal for each primitive, the same online and over recordings."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any, Protocol, Self
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from probdmp.checks import check_array, check_choice
+from probdmp.checks import check_choice
 from probdmp.demonstrations import Demonstration, Recordings, as_demonstrations
-from probdmp.detection.monitoring import LikelihoodMonitor, LikelihoodStatistic, replay
-from probdmp.detection.statistics import LIKELIHOODS
-from probdmp.detection.thresholds import PaperThreshold
+from probdmp.detection.calibrated_monitor import CalibratedMonitor
+from probdmp.detection.calibrated_rule import CalibratedRule
+from probdmp.detection.library import Learned, Library, own_tasks
+from probdmp.detection.monitoring import LikelihoodMonitor
+from probdmp.detection.options import DetectorOptions
+from probdmp.detection.paper_rule import PaperRule
 from probdmp.detection.verdict import Verdict
 from probdmp.dmp import Primitive, Task
 from probdmp.errors import InputError, InputTypeError, NotFittedError
-from probdmp.execution import check_tasks, task_of_recording
+from probdmp.execution import Observed, check_tasks
 
 __all__ = ["FailureDetector"]
 
-RULES = ("paper",)
-
-
-class Learned(Protocol):
-    """Something that holds a learned primitive, such as a ProbabilisticDMP."""
-
-    @property
-    def primitive_(self) -> Primitive: ...
+RULES = ("calibrated", "paper")
 
 
 class FailureDetector:
@@ -33,12 +29,37 @@ class FailureDetector:
 
     Parameters
     ----------
-    rule : `"paper"`: failed when the log-likelihood falls below twice its minimum over the training demonstrations.
-    likelihood : `"per_step"`: of each step by itself; `"cumulative"`: of all steps so far. The paper does not say which.
+    false_alarm_rate : alpha, the share of normal executions that may be called failed.
+    rule : `"calibrated"`: the threshold that this rate asks for; `"paper"`: failed when the log-likelihood falls below twice
+        its minimum over the training demonstrations, whatever the rate.
+    statistic : of the calibrated rule: `"trajectory"`: where the execution is, how it has moved, whether it stands still;
+        `"log_likelihood"`, `"nis"` or `"cusum"` of the filter's innovations.
+    calibration : of the calibrated rule: `"leave_one_out"`: each training demonstration is judged by what the others teach;
+        `"held_out"`: the demonstrations given to `fit` are others than those that taught.
+    pooled : whether the primitives of a library share one threshold, so that few demonstrations of each are enough.
+    persistence : moments in a row (hundredths of the duration for `"trajectory"`, samples otherwise) that must be above the
+        threshold. Every one more makes the alarm that much later, and rarer.
+    likelihood : of the paper's rule: `"per_step"`: of each step by itself; `"cumulative"`: of all steps so far. The paper does not
+        say which.
+
+    Attributes
+    ----------
+    primitives_ : the primitives by label.
     """
 
-    def __init__(self, *, rule: str = "paper", likelihood: str = "per_step") -> None:
-        self.rule, self.likelihood = rule, likelihood
+    def __init__(
+        self,
+        false_alarm_rate: float = 0.01,
+        *,
+        rule: str = "calibrated",
+        statistic: str = "trajectory",
+        calibration: str = "leave_one_out",
+        pooled: bool = True,
+        persistence: int = 1,
+        likelihood: str = "per_step",
+    ) -> None:
+        self.false_alarm_rate, self.rule, self.statistic, self.calibration = false_alarm_rate, rule, statistic, calibration
+        self.pooled, self.persistence, self.likelihood = pooled, persistence, likelihood
 
     def fit(
         self,
@@ -47,46 +68,49 @@ class FailureDetector:
         dt: float | None = None,
         tasks: Sequence[Task] | Mapping[str, Sequence[Task]] | None = None,
     ) -> Self:
-        """Learn what is normal from the demonstrations that taught a primitive.
+        """Learn what is normal.
 
         Parameters
         ----------
         learned : a learned primitive, or a library of them by label; demonstrations and tasks then come by label too.
+        demonstrations : those that taught it; with `calibration="held_out"`, others.
         dt : seconds between samples of bare arrays; as learned unless given.
-        tasks : what each demonstration was asked to do. Unless given, to start at its own first row and to reach the learned
-            goal in the learned time: what `execute(start=…)` knows. Say as much as will be known when executing, for the
-            detector takes the spread it is shown for normal.
+        tasks : what each demonstration was asked to do. Unless given, the detector prepares for executions that are told
+            nothing but their start, and, where it is calibrated, for those that are told their goal and duration as well.
         """
         check_choice(self.rule, "rule", RULES)
-        check_choice(self.likelihood, "likelihood", LIKELIHOODS)
-        library = learned if isinstance(learned, Mapping) else {"": learned}
-        recordings = _by_label(demonstrations, library, "demonstrations")
-        asked = _by_label(tasks, library, "tasks") if tasks is not None else dict.fromkeys(library)
-        primitives = {label: _primitive_of(item) for label, item in library.items()}
-        self.thresholds_ = {
-            primitive.identity: self._threshold(primitive, recordings[label], dt, asked[label])
-            for label, primitive in primitives.items()
-        }
-        self.primitives_ = primitives
+        library = Library.of(learned, demonstrations, dt, tasks)
+        self.primitives_ = {label: member.primitive for label, member in library.members.items()}
+        self.rule_: CalibratedRule | PaperRule
+        if self.rule == "paper":
+            self.rule_ = PaperRule.fit(self.likelihood, library)
+        else:
+            library.check_taught(self.calibration == "leave_one_out")
+            self.rule_ = CalibratedRule.fit(self._options(), library)
         return self
 
-    def monitor(self, primitive: Primitive) -> LikelihoodMonitor:
+    def monitor(self, primitive: Primitive, task: Task, dt: float) -> CalibratedMonitor | LikelihoodMonitor:
         """A fresh judge for one execution of a primitive, which the detector must have been fitted to."""
-        threshold = self._fitted_thresholds().get(primitive.identity)
-        if threshold is None:
-            raise InputError(
-                "a primitive that this detector was fitted to", "another one", "Learned anew? Fit the detector again too."
-            )
-        return LikelihoodMonitor(primitive, self.likelihood, threshold)
+        rule = self._fitted()
+        if primitive.identity not in {own.identity for own in self.primitives_.values()}:
+            hint = "Learned anew? Fit the detector again too."
+            raise InputError("a primitive that this detector was fitted to", "another one", hint)
+        return rule.monitor(primitive, task, dt)
+
+    def replay(
+        self, primitive: Primitive, tasks: Sequence[Task], recordings: Sequence[Demonstration]
+    ) -> Iterator[tuple[CalibratedMonitor | LikelihoodMonitor, Iterator[Observed]]]:
+        """For each recording a fresh judge and what an execution would have shown it, to be passed to its `update`."""
+        return self._fitted().replay(primitive, tasks, recordings)
 
     def verdicts(self, executions: Recordings, dt: float | None = None, tasks: Sequence[Task] | None = None) -> list[Verdict]:
         """A verdict for each recorded execution; with a library, the label of an execution says which primitive it runs.
 
         Parameters
         ----------
-        dt, tasks : as in `fit`, one task for each execution.
+        dt, tasks : as in `fit`, one task for each execution; unless given, it was told nothing but its start.
         """
-        self._fitted_thresholds()
+        rule = self._fitted()
         dts = {primitive.dt for primitive in self.primitives_.values()}
         recordings = as_demonstrations(executions, dts.pop() if dt is None and len(dts) == 1 else dt)
         if tasks is not None:
@@ -94,9 +118,8 @@ class FailureDetector:
         verdicts: dict[int, Verdict] = {}
         for label, members in self._members(recordings).items():
             primitive, chosen = self.primitives_[label], [recordings[k] for k in members]
-            asked = [tasks[k] for k in members] if tasks is not None else _own_tasks(primitive, chosen)
-            for k, ticks in zip(members, replay(primitive, asked, chosen), strict=True):
-                monitor = self.monitor(primitive)
+            asked = [tasks[k] for k in members] if tasks is not None else own_tasks(primitive, chosen)
+            for k, (monitor, ticks) in zip(members, rule.replay(primitive, asked, chosen), strict=True):
                 for observed in ticks:
                     monitor.update(observed)
                 verdicts[k] = monitor.verdict
@@ -110,8 +133,7 @@ class FailureDetector:
 
     def state(self) -> dict[str, Any]:
         """What a model file keeps, as plain values."""
-        minima = {identity: threshold.minimum for identity, threshold in self._fitted_thresholds().items()}
-        return {"rule": self.rule, "likelihood": self.likelihood, "minima": minima}
+        return {"rule": self.rule, **self._fitted().state()}
 
     @classmethod
     def from_state(cls, state: object, primitives: Mapping[str, Primitive]) -> Self:
@@ -124,23 +146,26 @@ class FailureDetector:
         """
         if not isinstance(state, Mapping):
             raise InputTypeError("the state of a detector as a mapping", f"{state!r:.100}")
-        identities = {primitive.identity for primitive in primitives.values()}
-        complete = set(state) == {"rule", "likelihood", "minima"} and isinstance(state["minima"], Mapping)
-        if not complete or set(state["minima"]) != identities:
-            raise InputError("a detector with rule, likelihood and a minimum for each primitive", f"{state!r:.200}")
-        detector = cls(
-            rule=check_choice(state["rule"], "rule", RULES),
-            likelihood=check_choice(state["likelihood"], "likelihood", LIKELIHOODS),
-        )
-        minima = {identity: float(check_array(minimum, "minimum", ())) for identity, minimum in state["minima"].items()}
+        parts = dict(state)
+        rule = check_choice(parts.pop("rule", None), "rule", RULES)
+        detector = cls(rule=rule)
         detector.primitives_ = dict(primitives)
-        detector.thresholds_ = {identity: PaperThreshold(minimum) for identity, minimum in minima.items()}
+        if rule == "paper":
+            detector.rule_ = PaperRule.from_state(parts, primitives)
+            detector.likelihood = detector.rule_.likelihood
+        else:
+            detector.rule_ = CalibratedRule.from_state(parts, primitives)
+            for name, value in parts["options"].items():
+                setattr(detector, name, value)
         return detector
 
-    def _fitted_thresholds(self) -> dict[str, PaperThreshold]:
-        if not hasattr(self, "thresholds_"):
+    def _options(self) -> DetectorOptions:
+        return DetectorOptions(self.false_alarm_rate, self.statistic, self.calibration, self.pooled, self.persistence)
+
+    def _fitted(self) -> CalibratedRule | PaperRule:
+        if not hasattr(self, "rule_"):
             raise NotFittedError("a fitted detector", "one without thresholds", "Call fit(primitive, demonstrations) first.")
-        return self.thresholds_
+        return self.rule_
 
     def _members(self, recordings: Sequence[Demonstration]) -> dict[str, list[int]]:
         """Which recordings are executions of which primitive; one that is alone needs no label."""
@@ -152,37 +177,3 @@ class FailureDetector:
                 raise InputError(f"executions labelled as one of {sorted(self.primitives_)}", repr(label))
             members.setdefault(label, []).append(k)
         return members
-
-    def _threshold(
-        self, primitive: Primitive, demonstrations: Recordings, dt: float | None, tasks: Sequence[Task] | None
-    ) -> PaperThreshold:
-        recordings = as_demonstrations(demonstrations, primitive.dt if dt is None else dt)
-        minimum = np.inf
-        asked = _own_tasks(primitive, recordings) if tasks is None else check_tasks(tasks, recordings)
-        for ticks in replay(primitive, asked, recordings):
-            statistic = LikelihoodStatistic(self.likelihood, primitive.ranges)
-            minimum = min(minimum, *(statistic.update(observed)[0] for observed in ticks))
-        if not np.isfinite(minimum):
-            raise InputError("demonstrations of which something was measured", "only missing samples")
-        return PaperThreshold(minimum)
-
-
-def _primitive_of(learned: Primitive | Learned) -> Primitive:
-    primitive = learned if isinstance(learned, Primitive) else getattr(learned, "primitive_", None)
-    if not isinstance(primitive, Primitive):
-        raise NotFittedError("a learned primitive", f"{learned!r:.100}", "Call fit(demonstrations) first.")
-    return primitive
-
-
-def _own_tasks(primitive: Primitive, recordings: Sequence[Demonstration]) -> list[Task]:
-    return [task_of_recording(primitive, recording, duration=primitive.duration) for recording in recordings]
-
-
-def _by_label(values: Any, library: Mapping[str, Any], name: str) -> Mapping[str, Any]:
-    """Values given for one primitive or by label, by label."""
-    if set(library) == {""} and not isinstance(values, Mapping):
-        return {"": values}
-    if not isinstance(values, Mapping) or not set(library) <= set(values):
-        given = sorted(values) if isinstance(values, Mapping) else type(values).__name__
-        raise InputError(f"{name} by label for each of {sorted(library)}", str(given))
-    return values

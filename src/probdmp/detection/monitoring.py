@@ -81,6 +81,7 @@ def replay(primitive: Primitive, tasks: Sequence[Task], recordings: Sequence[Dem
                 t,
                 t * recording.dt,
                 float(x),
+                recording.positions[t],
                 forward.log_likelihoods[t, k],
                 forward.innovations[t, k, :, 0],
                 forward.innovation_covariances[t, k, :, 0, 0],

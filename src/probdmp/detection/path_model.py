@@ -13,6 +13,7 @@ import numpy as np
 
 from probdmp.checks import FloatArray
 from probdmp.detection.phase_clock import TICKS
+from probdmp.detection.profile import ExecutionProfile
 from probdmp.dmp import Primitive, path_distribution
 
 __all__ = ["PathModel", "path_model"]
@@ -40,19 +41,19 @@ class PathModel:
         return np.asarray(self.means + np.einsum("mde,ne->nmd", self.goal_gains, ahead))
 
 
-def path_model(primitive: Primitive, tempo_std: float, knows_goal: bool) -> PathModel:
+def path_model(primitive: Primitive, profile: ExecutionProfile, knows_goal: bool) -> PathModel:
     """The Gaussian over paths of a primitive that was learned with its variation.
 
     Parameters
     ----------
-    tempo_std : standard deviation of the logarithm of the duration; of use where the goal and the duration are not told.
+    profile : what the demonstrations showed beside the path: noise, and how much slower or faster executions are.
     knows_goal : whether executions are told their goal and duration.
     """
     path = path_distribution(primitive, TICKS + 1)
     ranges = primitive.ranges
     means = path.means / ranges
     covariance = path.covariance / np.multiply.outer(ranges, ranges)[:, None, :]
-    noise = primitive.observation_variances / ranges**2 + NOISE_FLOOR**2
+    noise = (profile.noise_stds / ranges) ** 2 + NOISE_FLOOR**2
     gains = np.zeros((*means.shape, len(ranges)))
     if knows_goal:
         ending = covariance[:, :, -1]  # (M, D, D): with the end
@@ -60,6 +61,6 @@ def path_model(primitive: Primitive, tempo_std: float, knows_goal: bool) -> Path
         covariance = covariance - np.einsum("mde,nfe->mdnf", gains, ending)
     else:
         phases = np.linspace(0.0, 1.0, TICKS + 1)
-        stretch = tempo_std * phases[:, None] * np.gradient(means, phases, axis=0)
+        stretch = profile.tempo_std * phases[:, None] * np.gradient(means, phases, axis=0)
         covariance = covariance + np.multiply.outer(stretch, stretch)
     return PathModel(means, covariance, gains, noise)

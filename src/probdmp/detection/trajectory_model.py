@@ -22,7 +22,7 @@ from probdmp.detection.trajectory_statistics import (
 )
 from probdmp.detection.windows import gather
 
-__all__ = ["TrajectoryFollower", "TrajectoryModel"]
+__all__ = ["TrajectoryFollower", "TrajectoryModel", "as_suspicion"]
 
 LARGEST_LOG_RATIO = 500.0
 EVIDENCE_SCALE = 10.0
@@ -77,6 +77,8 @@ class TrajectoryFollower:
 
     def __init__(self, trajectory: TrajectoryModel, means: FloatArray) -> None:
         self._trajectory, self._means = trajectory, means
+        self.means = means[0]
+        """(M, D) array, the mean path."""
         self.recent: deque[FloatArray] = deque(maxlen=MEMORY)
         self._tick = -1
         self._squares: deque[float] = deque(maxlen=SLOPPINESS_DELAY)
@@ -84,8 +86,7 @@ class TrajectoryFollower:
 
     def update(self, displacement: FloatArray) -> FloatArray:
         """Values of all channels at the next tick, (C,) array."""
-        self._tick += 1
-        self.recent.append(displacement)
+        self.remember(displacement)
         trajectory, here = self._trajectory, np.array([self._tick])
         values = np.full(len(CHANNELS), np.nan)
         values[0] = trajectory.position.judge(here, self.window(self._tick, Position.offsets), self._means)[0, 0]
@@ -98,6 +99,11 @@ class TrajectoryFollower:
                 evidence = trajectory.forecast.judge(np.array([place]), window, self._means)
                 values[channel] = as_suspicion(evidence[0, 0, point])
         return values
+
+    def remember(self, displacement: FloatArray) -> None:
+        """Take in a tick (D,) without judging it."""
+        self._tick += 1
+        self.recent.append(displacement)
 
     def window(self, place: int, offsets: FloatArray) -> FloatArray:
         """(1, 1, P, D) array: displacements at ticks place + offsets."""

@@ -130,7 +130,9 @@ class ProbabilisticDMP:
         options = LearningOptions(self.weight_model, self.smoothing)
         self.primitive_: Primitive
         self.fit_report_: FitReport | None
-        self.primitive_, self.fit_report_ = fit_primitive(as_demonstrations(demonstrations, dt), configuration, options)
+        recordings = as_demonstrations(demonstrations, dt)
+        self.primitive_, self.fit_report_ = fit_primitive(recordings, configuration, options)
+        self.taught_by_ = frozenset(recording.fingerprint for recording in recordings)
         return self
 
     def rollout(

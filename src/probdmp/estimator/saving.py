@@ -30,10 +30,14 @@ def write_learned(
     """
     primitives = {label: primitive for label, (primitive, _) in learned.items()}
     state = None if detector is None else detector.state()
-    if state is not None and set(state["minima"]) != {primitive.identity for primitive in primitives.values()}:
+    if detector is not None and _identities(detector.primitives_) != _identities(primitives):
         raise InputError("a detector fitted to these primitives", "one for others", "Fit it to them first.")
     settings = {label: _plain(parameters) for label, (_, parameters) in learned.items()}
     write_model(path, ModelContents(primitives, settings, state))
+
+
+def _identities(primitives: Mapping[str, Primitive]) -> set[str]:
+    return {primitive.identity for primitive in primitives.values()}
 
 
 def _plain(parameters: Mapping[str, Any]) -> dict[str, Any]:

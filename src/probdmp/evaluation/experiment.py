@@ -36,6 +36,8 @@ class Experiment:
     """Names of faults, some with a size, such as `"push:0.4"`; see `probdmp.demonstrations.fault_named`."""
     configuration: Configuration = PUBLISHED
     """How primitives are made; the paper's unless given. Readings of the paper's rule set the forcing noise themselves."""
+    false_alarm_rate: float = 0.01
+    """What a calibrated detector is asked for, as a share of normal executions."""
     seeds: int = 1
     """Number of splits: with the seeds `seed`, `seed` + 1, …, figures pooled."""
     traces: bool = False

@@ -13,14 +13,22 @@ import numpy as np
 
 from probdmp.demonstrations import Demonstration
 from probdmp.detection import FailureDetector
-from probdmp.detection.monitoring import replay
 from probdmp.dmp import Configuration, Primitive, Task
 from probdmp.evaluation.experiment import Experiment
 from probdmp.evaluation.outcomes import Finding, Outcome, Trace, outcomes_of
 from probdmp.evaluation.trials import Trial, commanded_tasks
 from probdmp.learning import LearningOptions, fit_primitive
 
-__all__ = ["DETECTORS", "READINGS", "Judge", "Progress", "Reading", "fit_paper_detector", "learned_primitive"]
+__all__ = [
+    "DETECTORS",
+    "READINGS",
+    "Judge",
+    "Progress",
+    "Reading",
+    "fit_paper_detector",
+    "judge_by_calibrated",
+    "learned_primitive",
+]
 
 Progress = Callable[[str], None]
 """Called by a judge with its label after each class."""
@@ -81,19 +89,48 @@ def _judge_by_paper(reading: Reading, trials: Sequence[Trial], experiment: Exper
     return outcomes
 
 
+def judge_by_calibrated(
+    trials: Sequence[Trial], experiment: Experiment, on_class: Progress, **parameters: object
+) -> list[Outcome]:
+    """The calibrated detector: every class taught with its variation, all of them calibrated together.
+
+    Parameters
+    ----------
+    parameters : of `FailureDetector`, to see what they do.
+    """
+    configuration = replace(Configuration(), n_basis=experiment.configuration.n_basis)
+    options = LearningOptions("hierarchical")
+    primitives = {trial.label: fit_primitive(trial.training, configuration, options)[0] for trial in trials}
+    detector = FailureDetector(experiment.false_alarm_rate, **parameters)  # type: ignore[arg-type]
+    asked = {t.label: commanded_tasks(primitives[t.label], t.training, experiment.task) for t in trials}
+    detector.fit(primitives, {trial.label: trial.training for trial in trials}, tasks=asked)
+    outcomes: list[Outcome] = []
+    for trial in trials:
+        primitive = primitives[trial.label]
+        tasks = commanded_tasks(primitive, trial.tests, experiment.task)
+        findings = {
+            name: _findings(detector, primitive, tasks, executions, experiment.traces)
+            for name, executions in trial.executions.items()
+        }
+        outcomes += outcomes_of(trial, findings)
+        on_class(trial.label)
+    return outcomes
+
+
 def _findings(
     detector: FailureDetector, primitive: Primitive, tasks: Sequence[Task], executions: Sequence[Demonstration], traces: bool
 ) -> list[Finding]:
     findings = []
-    for execution, ticks in zip(executions, replay(primitive, tasks, executions), strict=True):
-        monitor = detector.monitor(primitive)
+    for execution, (monitor, ticks) in zip(executions, detector.replay(primitive, tasks, executions), strict=True):
         ratios = np.array([monitor.update(observed) for observed in ticks])
-        alarm = monitor.verdict.time if monitor.verdict.failed else None
-        findings.append(Finding(alarm, trace=Trace(execution.times, ratios) if traces else None))
+        verdict = monitor.verdict
+        alarm = verdict.time if verdict.failed else None
+        findings.append(Finding(alarm, verdict.kind, verdict.cause, Trace(execution.times, ratios) if traces else None))
     return findings
 
 
 DETECTORS: dict[str, Mapping[str, Judge]] = {
+    "calibrated": {"calibrated": judge_by_calibrated},
     "paper": {reading.name: partial(_judge_by_paper, reading) for reading in READINGS},
 }
 """By name, as given to `--detector`: its judges, the first of which stands for it."""

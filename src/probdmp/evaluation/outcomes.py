@@ -31,6 +31,8 @@ class Finding:
     kind: str = ""
     """What the alarm is about, such as `"motion"`, `"timing"` or `"sensor"`; nothing where the judge does not say. All but
     `"sensor"` are about the movement."""
+    cause: str = ""
+    """What it is in particular, such as `"held"`."""
     trace: Trace | None = field(default=None, compare=False)
     """Where `Experiment.traces` asks for it."""
 

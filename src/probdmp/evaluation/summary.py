@@ -135,7 +135,7 @@ def _summarize_fault(fault: str, outcomes: Sequence[Outcome], rate: RateOf) -> F
         ever=rate(ever),
         false_alarms=rate([e and not s for e, _, s in both]) if nature == BENIGN else None,
         called_sensor=rate([d and s for _, d, s in both]) if nature == SENSOR else None,
-        kinds=dict(Counter(f.kind for f, d in zip(findings, detected, strict=True) if d)),
+        kinds=dict(Counter(f.cause or f.kind for f, d in zip(findings, detected, strict=True) if d)),
         **_latencies(fault, [o for o, d in zip(outcomes, detected, strict=True) if d]),
         by_onset=_by_onset(fault, outcomes, detected),
     )

@@ -32,6 +32,8 @@ class Observed(NamedTuple):
     """Seconds since the start."""
     phase: float
     """x, from 1 down."""
+    positions: FloatArray
+    """(D,) array, data units: what was measured; NaN where nothing was."""
     contributions: FloatArray
     """(D,) array, nats: the share of each degree of freedom in the log-likelihood."""
     innovations: FloatArray
@@ -69,7 +71,7 @@ class Monitor(Protocol):
 class Detector(Protocol):
     """Makes a monitor for a primitive."""
 
-    def monitor(self, primitive: Primitive) -> Monitor: ...
+    def monitor(self, primitive: Primitive, task: Task, dt: float) -> Monitor: ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,7 +131,7 @@ class OnlineExecution:
         """Back to the start, alarm cleared."""
         kind = STEP_FILTERS[self.primitive.configuration.weight_uncertainty]
         self._filter: StepFilter = kind(self.primitive, self.task, self.dt, self._chunk)
-        self._monitor = self._detector.monitor(self.primitive) if self._detector is not None else None
+        self._monitor = self._detector.monitor(self.primitive, self.task, self.dt) if self._detector is not None else None
         self._step, self._clock_offset, self.n_dropped, self._n_late = 0, 0.0, 0, 0
         self._held: FloatArray | None = None
         self._last: ExecutionStep | None = None
@@ -186,7 +188,7 @@ class OnlineExecution:
         seen = self._filter.update(measured)
         time = t * self.dt
         phase = float(phases_at(np.asarray(time), self.task.duration))
-        observed = Observed(t, time, phase, seen.contributions, seen.innovations, seen.innovation_variances)
+        observed = Observed(t, time, phase, measured, seen.contributions, seen.innovations, seen.innovation_variances)
         test_ratio = self._monitor.update(observed) if self._monitor is not None else np.nan
         mean, covariance = self._filter.predict()
         self._step += 1

@@ -1,18 +1,19 @@
 """Weights of their own for every demonstration, and the Gaussian from which they are drawn."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from probdmp.checks import FloatArray
 from probdmp.demonstrations import Demonstration, positions_on_phases
-from probdmp.dmp import Primitive
+from probdmp.dmp import Primitive, Variation
 from probdmp.dmp.responses import parameter_responses
 from probdmp.dmp.transformation_system import POSITION
 from probdmp.dmp.via_points import with_variation
 from probdmp.learning.hierarchical import estimate_variation
 
-__all__ = ["varied_weights"]
+__all__ = ["left_out_variations", "varied_weights"]
 
 MOST_PHASES = {"exact": 101, "semi_implicit_euler": 1001}
 """The path of the exact scheme hardly depends on its step, so a hundred will do; semi-implicit Euler learns at the step of the
@@ -29,10 +30,8 @@ def varied_weights(still: Primitive, demonstrations: Sequence[Demonstration]) ->
     still : the primitive to be, for its configuration, ranges and start.
     """
     configuration = still.configuration
-    n_phases = min(round(1 / still.phase_step) + 1, MOST_PHASES[configuration.discretization])
-    responses = parameter_responses(configuration, 1 / (n_phases - 1), n_phases)[:, POSITION]
-    paths = positions_on_phases(demonstrations, n_phases)
-    variation = estimate_variation(responses, paths - paths[:, :1], still.ranges)
+    responses, displacements = _phase_paths(still, demonstrations)
+    variation = estimate_variation(responses, displacements, still.ranges)
     varied = with_variation(still, variation)
     return replace(
         varied,
@@ -40,3 +39,18 @@ def varied_weights(still: Primitive, demonstrations: Sequence[Demonstration]) ->
         forcing_precisions=LARGEST_PRECISION / (configuration.stiffness * still.ranges) ** 2,
         observation_variances=variation.residual_variances,
     )
+
+
+def left_out_variations(primitive: Primitive, demonstrations: Sequence[Demonstration]) -> Iterator[Variation]:
+    """For each of the demonstrations that taught a primitive, the variation that all the others teach: prior and all."""
+    responses, displacements = _phase_paths(primitive, demonstrations)
+    for k in range(len(demonstrations)):
+        yield estimate_variation(responses, np.delete(displacements, k, axis=0), primitive.ranges)
+
+
+def _phase_paths(primitive: Primitive, demonstrations: Sequence[Demonstration]) -> tuple[FloatArray, FloatArray]:
+    """Responses (M, N + 2) and displacements from the start (K, M, D) on M common phases."""
+    n_phases = min(round(1 / primitive.phase_step) + 1, MOST_PHASES[primitive.configuration.discretization])
+    responses = parameter_responses(primitive.configuration, 1 / (n_phases - 1), n_phases)[:, POSITION]
+    paths = positions_on_phases(demonstrations, n_phases)
+    return responses, paths - paths[:, :1]

@@ -1,0 +1,104 @@
+"""A calibrated detector at work on one execution."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from probdmp.checks import FloatArray
+from probdmp.detection.calibration import Calibration
+from probdmp.detection.sources import Source
+from probdmp.detection.verdict import Verdict
+from probdmp.execution import Observed
+
+__all__ = ["CalibratedMonitor"]
+
+LOOKED_AT_AGAIN = 10
+"""Moments after which an alarm is compared with the other primitives of the library again."""
+
+
+class CalibratedMonitor:
+    """Compares the surprise of one execution with the threshold; the first alarm is latched, its reason looked into further.
+
+    Parameters
+    ----------
+    channels : (C) names of the channels.
+    persistence : moments in a row with a test ratio above 1 that make an alarm.
+    """
+
+    def __init__(
+        self,
+        source: Source,
+        calibration: Calibration,
+        channels: tuple[str, ...],
+        names: tuple[str, ...],
+        persistence: int,
+    ) -> None:
+        self._source, self._calibration, self._channels = source, calibration, channels
+        self._persistence = persistence
+        self._ratio, self._n_above, self._n_since, self._is_latched = 0.0, 0, 0, False
+        self._verdict = Verdict(False, 0, 0.0, 1.0, 0.0, np.zeros(len(names)), names)
+
+    @property
+    def verdict(self) -> Verdict:
+        """What can be said so far."""
+        return self._verdict
+
+    def update(self, observed: Observed) -> float:
+        """Take one tick into account; returns the test ratio, above 1 for an alarm."""
+        for values in self._source.update(observed):
+            self._judge(observed, values)
+        source, verdict = self._source, self._verdict
+        if source.sensor_fault and not verdict.has_sensor_fault:
+            self._note_sensor(observed)
+        elif source.is_stale != verdict.is_stale:
+            self._verdict = replace(verdict, is_stale=source.is_stale)
+            if source.is_stale and not verdict.failed:
+                self._latch(observed, 1.0, np.zeros(len(verdict.names)))
+                self._is_latched = True
+                self._verdict = replace(self._verdict, failed=True, kind="data missing", cause="nothing measured")
+        return self._ratio
+
+    def _judge(self, observed: Observed, values: FloatArray) -> None:
+        surprises = self._calibration.surprise(values)
+        channel = int(np.argmax(surprises))
+        self._ratio = float(surprises[channel] / self._calibration.threshold)
+        self._n_above = self._n_above + 1 if self._ratio > 1 else 0
+        if self._is_latched:
+            self._look_closer()
+        elif self._ratio > self._verdict.test_ratio or self._n_above >= self._persistence:
+            self._latch(observed, self._ratio, self._source.contributions(channel), self._channels[channel])
+            if self._n_above >= self._persistence:
+                self._is_latched = True
+                self._verdict = replace(self._verdict, failed=True)
+                self._look_closer()
+
+    def _latch(self, observed: Observed, ratio: float, contributions: FloatArray, channel: str = "") -> None:
+        self._verdict = replace(
+            self._verdict,
+            step=observed.step,
+            time=observed.time,
+            phase=observed.phase,
+            test_ratio=ratio,
+            contributions=contributions,
+            channel=channel,
+        )
+
+    def _look_closer(self) -> None:
+        """The reason as it looks now; that of a faulty sensor stands."""
+        if self._verdict.kind not in ("sensor", "data missing"):
+            kind, cause = self._source.diagnose()
+            better = self._verdict.better
+            if self._n_since % LOOKED_AT_AGAIN == 0:
+                better = self._source.better()
+            self._n_since += 1
+            self._verdict = replace(self._verdict, kind=kind, cause=cause, better=better if kind == "motion" else "")
+
+    def _note_sensor(self, observed: Observed) -> None:
+        """A sensor fault explains what the movement seemed to do."""
+        shares = self._source.sensor_shares
+        if not self._verdict.failed:
+            self._latch(observed, float(shares.max()), np.zeros(len(shares)), "sensor")
+        self._is_latched = True
+        self._verdict = replace(
+            self._verdict, failed=True, has_sensor_fault=True, kind="sensor", cause=self._source.sensor_fault, better=""
+        )

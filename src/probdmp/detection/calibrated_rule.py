@@ -1,0 +1,197 @@
+"""Detection at a chosen rate of false alarms: any statistic, its threshold from executions that taught nothing to the primitive.
+
+Executions that are told their goal and duration and executions that are not differ in what is normal, so there is a
+calibration for each. Unless tasks are given, both are made, from demonstrations that are told where they end, or not.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict
+from os import cpu_count
+from typing import Any, Protocol, Self
+
+import numpy as np
+
+from probdmp.checks import FloatArray, check_array
+from probdmp.demonstrations import Demonstration
+from probdmp.detection.calibrated_monitor import CalibratedMonitor
+from probdmp.detection.calibration import Calibration
+from probdmp.detection.innovation_family import InnovationFamily
+from probdmp.detection.library import Library, Member, own_tasks
+from probdmp.detection.options import DetectorOptions
+from probdmp.detection.sources import Source
+from probdmp.detection.trajectory_family import TrajectoryFamily, tells_goal
+from probdmp.dmp import Primitive, Task
+from probdmp.errors import InputError, TooFewDemonstrationsError
+from probdmp.execution import Observed, task_of_recording
+
+__all__ = ["CalibratedRule"]
+
+MODES = {True: "known", False: "nominal"}
+"""By whether an execution is told its goal."""
+POOLED = ""
+"""Stands for the whole library where primitives share a threshold."""
+
+
+class Family(Protocol):
+    """A statistic at work on a library."""
+
+    @property
+    def channels(self) -> tuple[str, ...]: ...
+    def source(self, primitive: Primitive, task: Task, dt: float) -> Source: ...
+    def replay(
+        self, primitive: Primitive, tasks: Sequence[Task], recordings: Sequence[Demonstration]
+    ) -> Iterator[tuple[Source, Iterator[Observed]]]: ...
+    def left_out_maxima(self, member: Member, tasks: Sequence[Task]) -> FloatArray: ...
+    def maxima(self, member: Member, tasks: Sequence[Task]) -> FloatArray: ...
+    def state(self) -> dict[str, Any]: ...
+
+
+class CalibratedRule:
+    """A statistic and its calibrations.
+
+    Parameters
+    ----------
+    family : the statistic.
+    labels : label of each primitive by its identity.
+    calibrations : by whether the goal is told, then by label, or `POOLED`.
+    """
+
+    def __init__(
+        self,
+        options: DetectorOptions,
+        family: Family,
+        primitives: Mapping[str, Primitive],
+        calibrations: Mapping[bool, Mapping[str, Calibration]],
+    ) -> None:
+        self.options, self.family, self.calibrations = options, family, calibrations
+        self._labels = {primitive.identity: label for label, primitive in primitives.items()}
+        self._primitives = primitives
+
+    @classmethod
+    def fit(cls, options: DetectorOptions, library: Library) -> Self:
+        """Calibrate on the recordings of the library."""
+        family: Family
+        family = TrajectoryFamily.fit(library) if options.statistic == "trajectory" else InnovationFamily(options.statistic)
+        primitives = {label: member.primitive for label, member in library.members.items()}
+        calibrations = {}
+        for knows_goal in (True, False):
+            tasks = {label: _tasks(member, knows_goal) for label, member in library.members.items()}
+            if all(tasks.values()):
+                calibrations[knows_goal] = _calibrate(options, family, library, tasks)
+        if not calibrations:
+            raise InputError("tasks that all tell the goal, or that all do not", "some of each")
+        return cls(options, family, primitives, calibrations)
+
+    def calibration(self, primitive: Primitive, task: Task) -> Calibration:
+        """What is normal for an execution."""
+        by_label = self.calibrations.get(tells_goal(task))
+        if by_label is None:
+            told, other = ("tell", "do not") if tells_goal(task) else ("do not tell", "do")
+            raise InputError(
+                f"a detector calibrated on executions that {told} their goal",
+                f"one calibrated on executions that {other}",
+                "Fit it without tasks, for both, or give the tasks that executions will have.",
+            )
+        return by_label[POOLED if self.options.pooled else self._labels[primitive.identity]]
+
+    def monitor(self, primitive: Primitive, task: Task, dt: float) -> CalibratedMonitor:
+        """A fresh judge for one execution."""
+        return self._monitor(primitive, task, self.family.source(primitive, task, dt))
+
+    def replay(
+        self, primitive: Primitive, tasks: Sequence[Task], recordings: Sequence[Demonstration]
+    ) -> Iterator[tuple[CalibratedMonitor, Iterator[Observed]]]:
+        """For each recording, a judge and what an execution would have shown it."""
+        for task, (source, ticks) in zip(tasks, self.family.replay(primitive, tasks, recordings), strict=True):
+            yield self._monitor(primitive, task, source), ticks
+
+    def state(self) -> dict[str, Any]:
+        """Plain values."""
+        calibrations = {
+            MODES[knows_goal]: {
+                label: {"maxima": c.maxima.tolist(), "labels": list(c.labels)} for label, c in by_label.items()
+            }
+            for knows_goal, by_label in self.calibrations.items()
+        }
+        return {"options": asdict(self.options), "family": self.family.state(), "calibrations": calibrations}
+
+    @classmethod
+    def from_state(cls, state: Mapping[str, Any], primitives: Mapping[str, Primitive]) -> Self:
+        """The rule again.
+
+        Raises
+        ------
+        InputError, InputTypeError
+            If the state is not one, or that of a detector for other primitives.
+        """
+        try:
+            options = DetectorOptions(**state["options"])
+            family: Family
+            if options.statistic == "trajectory":
+                family = TrajectoryFamily.from_state(state["family"], primitives)
+            else:
+                family = InnovationFamily(options.statistic)
+            calibrations = {
+                knows_goal: {
+                    label: _restored(values, options, len(family.channels))
+                    for label, values in state["calibrations"][mode].items()
+                }
+                for knows_goal, mode in MODES.items()
+                if mode in state["calibrations"]
+            }
+            complete = all(set(c) == ({POOLED} if options.pooled else set(primitives)) for c in calibrations.values())
+        except (KeyError, TypeError, AttributeError) as error:
+            raise InputError("a calibrated detector for these primitives", f"{type(error).__name__}: {error}") from error
+        if not calibrations or not complete:
+            raise InputError("calibrations for these primitives", f"{sorted(state['calibrations'])}")
+        return cls(options, family, primitives, calibrations)
+
+    def _monitor(self, primitive: Primitive, task: Task, source: Source) -> CalibratedMonitor:
+        calibration = self.calibration(primitive, task)
+        return CalibratedMonitor(source, calibration, self.family.channels, primitive.names, self.options.persistence)
+
+
+def _tasks(member: Member, knows_goal: bool) -> list[Task]:
+    """Tasks of the recordings if they tell, or do not tell, the goal; none otherwise."""
+    if member.tasks is not None:
+        return [task for task in member.tasks if tells_goal(task) == knows_goal] if _agree(member.tasks, knows_goal) else []
+    if not knows_goal:
+        return own_tasks(member.primitive, member.recordings)
+    return [task_of_recording(member.primitive, r, goal=_last_seen(r)) for r in member.recordings]
+
+
+def _agree(tasks: Sequence[Task], knows_goal: bool) -> bool:
+    return all(tells_goal(task) == knows_goal for task in tasks)
+
+
+def _last_seen(recording: Demonstration) -> FloatArray:
+    """Where a recording ends, (D,) array."""
+    return np.array([column[~np.isnan(column)][-1] for column in recording.positions.T])
+
+
+def _calibrate(
+    options: DetectorOptions, family: Family, library: Library, tasks: Mapping[str, Sequence[Task]]
+) -> dict[str, Calibration]:
+    """Calibrations by label, or one for all."""
+    for label, member in library.members.items():
+        if options.calibration == "leave_one_out" and len(member.recordings) < 2:
+            hint = 'Record more, or give others with calibration="held_out".'
+            raise TooFewDemonstrationsError("two or more demonstrations to leave one out", f"one of {label!r}", hint)
+    judge = family.left_out_maxima if options.calibration == "leave_one_out" else family.maxima
+    labels = list(library.members)
+    with ThreadPoolExecutor(cpu_count()) as pool:  # the linear algebra does not hold the interpreter's lock
+        found = list(pool.map(lambda label: judge(library.members[label], tasks[label]), labels))
+    maxima = dict(zip(labels, found, strict=True))
+    of_each = {label: [label] * len(values) for label, values in maxima.items()}
+    rate, method = options.false_alarm_rate, options.calibration
+    if not options.pooled:
+        return {label: Calibration(maxima[label], of_each[label], rate, method) for label in labels}
+    pooled = Calibration(np.concatenate(found), [name for label in labels for name in of_each[label]], rate, method)
+    return {POOLED: pooled}
+
+
+def _restored(values: Mapping[str, Any], options: DetectorOptions, n_channels: int) -> Calibration:
+    labels = [str(label) for label in values["labels"]]
+    maxima = check_array(values["maxima"], "maxima", (len(labels), n_channels))
+    return Calibration(maxima, labels, options.false_alarm_rate, options.calibration)

@@ -1,0 +1,44 @@
+"""From the measurements of one execution to its displacements at each tick of the phase clock."""
+
+import numpy as np
+
+from probdmp.checks import FloatArray
+from probdmp.demonstrations import Demonstration
+from probdmp.detection.phase_clock import PhaseClock, Tick
+from probdmp.detection.profile import ExecutionProfile
+from probdmp.detection.sensor_watch import SensorWatch
+from probdmp.dmp import Primitive, Task
+
+__all__ = ["ExecutionTicks", "ticks_of_recording"]
+
+
+class ExecutionTicks:
+    """Turns the samples of one execution into ticks; what a sensor cannot have measured is left out."""
+
+    def __init__(self, primitive: Primitive, profile: ExecutionProfile, task: Task, dt: float) -> None:
+        duration = float(task.duration)
+        self.sensors = SensorWatch(profile, primitive.ranges, duration, dt)
+        self._clock = PhaseClock(primitive.n_dof, duration, dt)
+        self._ranges, self._start = primitive.ranges, np.full(primitive.n_dof, np.nan)
+        self._goal = task.goal
+
+    def advance(self, time: float, measured: FloatArray) -> list[Tick]:
+        """Take in a sample (D,), data units; returns the ticks that are complete."""
+        believed = self.sensors.believe(measured)
+        # Displacements count from where the execution was first seen, not from where it was told to be.
+        self._start = np.where(np.isnan(self._start), believed, self._start)
+        return self._clock.advance(time, (believed - self._start) / self._ranges)
+
+    @property
+    def goal(self) -> FloatArray:
+        """(D,) array: displacement of the goal as a fraction of the range; NaN where it is not told or the start not seen."""
+        return np.asarray((self._goal - self._start) / self._ranges)
+
+
+def ticks_of_recording(
+    primitive: Primitive, profile: ExecutionProfile, task: Task, recording: Demonstration
+) -> tuple[FloatArray, FloatArray]:
+    """Displacements of a whole recording at its ticks, (T, D), and its goal, (D,)."""
+    ticks = ExecutionTicks(primitive, profile, task, recording.dt)
+    path = [tick.values for t, row in enumerate(recording.positions) for tick in ticks.advance(t * recording.dt, row)]
+    return np.stack(path) if path else np.zeros((0, recording.n_dof)), ticks.goal
