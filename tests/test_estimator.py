@@ -472,6 +472,9 @@ def test_every_method_takes_joint_weights(varied, letters):
         assert trajectory.covariances.shape == (len(trajectory.times), 2, 3, 3)
         assert np.isfinite(trajectory.means).all()
     assert varied.fit_report_.observation_noise is None
+    rolled = varied.rollout(demo.positions[0], demo.positions[-1], demo.duration, demo.dt)
+    errors = np.sqrt(np.mean((rolled.positions - demo.positions) ** 2, axis=0)) / varied.primitive_.ranges
+    np.testing.assert_allclose(varied.fit_report_.reproduction_errors[0], errors, rtol=1e-6)
     np.testing.assert_allclose(varied.score_samples([demo])[0], varied.track(demo).log_likelihoods.sum(), rtol=1e-9)
     assert len(varied.sample(3, random_state=0)) == 3
     e = varied.execute(demo.positions[0], demo.positions[-1], demo.duration, demo.dt)

@@ -1,5 +1,7 @@
 """What is asked of an execution: as given, or as learned."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from strategies import make_primitive
@@ -46,6 +48,15 @@ def test_what_is_given_is_taken(primitive):
 def test_bad_points_are_refused_by_name(primitive, name, bad, error, match):
     with pytest.raises(error, match=f"Expected {name} {match}"):
         task_for(primitive, **{name: bad})
+
+
+def test_a_goal_that_is_not_told_is_as_learned(primitive):
+    """With joint weights it has its learned spread too, so the task does not name one."""
+    joint = replace(primitive, configuration=replace(primitive.configuration, scaling="none", weight_uncertainty="joint"))
+    task = task_for(joint)
+    assert np.isnan(task.goal).all()
+    np.testing.assert_array_equal(joint.goals(task), primitive.goal)
+    np.testing.assert_array_equal(joint.goals(task_for(joint, goal=[1, 2])), [1, 2])
 
 
 def test_a_start_may_be_unknown_and_a_goal_may_not(primitive):
@@ -106,7 +117,7 @@ def test_lists_and_numbers_become_arrays():
 @pytest.mark.parametrize(
     ("changes", "match"),
     [
-        ({"goal": [1.0, np.nan]}, r"goal finite, got nan at index \[1\]"),
+        ({"goal": [1.0, np.inf]}, r"goal finite or NaN for 'not measured', got inf at index \[1\]"),
         ({"start": [np.inf, 1.0]}, r"start finite or NaN.*, got inf"),
         ({"start_velocity": [-np.inf, 1.0]}, r"start_velocity finite or NaN.*, got -inf"),
         ({"start": [1.0]}, r"start, goal and start_velocity of one shape, got \(1,\) and \(2,\)"),

@@ -222,7 +222,7 @@ def test_pooled_weights_can_be_joint_too(scheme):
     joint = replace(p, configuration=replace(p.configuration, weight_uncertainty="joint"))
     task = task_for(p, goal=p.goal)
     one, other = roll_out(p, task, p.duration / 50), roll_out(joint, task, p.duration / 50)
-    wide = roll_out(joint, task_for(p), p.duration / 50)
+    wide = roll_out(joint, task_for(joint), p.duration / 50)
     np.testing.assert_allclose(wide.means, one.means, rtol=1e-9, atol=1e-9 * np.abs(one.means).max())
     assert np.all(other.position_stds[-1] < wide.position_stds[-1])
     assert wide.position_stds.max() > 1.5 * one.position_stds.max()

@@ -42,6 +42,7 @@ def test_as_published_has_the_papers_choices():
         "scaling": "paper",
         "alpha_z": 25.0,
         "smoothing": 0.05,
+        "goal_handling": "blend",  # of joint weights: without effect here
     }
     assert ProbabilisticDMP.as_published(forcing_noise="posterior").forcing_noise == "posterior"
     assert replace(PUBLISHED, forcing_noise="predictive") == Experiment().configuration

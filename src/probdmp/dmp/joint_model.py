@@ -16,12 +16,12 @@ from probdmp.checks import FloatArray
 from probdmp.dmp.goal_handling import conditioned_part
 from probdmp.dmp.path_distribution import parameter_distribution, parameter_factor
 from probdmp.dmp.primitive import Primitive
-from probdmp.dmp.responses import GOAL, START_VELOCITY
+from probdmp.dmp.responses import GOAL, START_VELOCITY, parameter_responses
 from probdmp.dmp.task import Task
 from probdmp.dmp.transformation_system import POSITION
 from probdmp.gaussian import Belief, linear_moments, observe, unit_belief
 
-__all__ = ["JointModel", "joint_model", "state_designs", "state_rows"]
+__all__ = ["JointExecutions", "JointModel", "joint_executions", "joint_model", "mean_positions", "state_designs", "state_rows"]
 
 START = 0
 """Where p0 is in x; the parameters follow, each one place further than in theta."""
@@ -43,6 +43,15 @@ class JointModel(NamedTuple):
         """Given values (*batch, D) of rows (*batch, N + 3) of each degree of freedom; NaN where nothing was seen."""
         design = _design(self.factors, rows[..., None, :])[..., 0, :]
         return self._replace(belief=observe(self.belief, values - _along(self.means, rows), design, variances).belief)
+
+
+class JointExecutions(NamedTuple):
+    """A batch of N executions, ready to be observed."""
+
+    model: JointModel
+    """With the batch axis (N)."""
+    rows: FloatArray
+    """(T, N, 3, n_basis + 3) array: each state as a function of what is unknown."""
 
 
 def joint_model(primitive: Primitive, task: Task, end_rows: FloatArray) -> JointModel:
@@ -97,6 +106,31 @@ def state_designs(model: JointModel, rows: FloatArray) -> tuple[FloatArray, Floa
     rows : (*batch, 3, N + 3) array, see `state_rows`.
     """
     return np.matmul(model.means, rows.mT), _design(model.factors, rows)
+
+
+def joint_executions(primitive: Primitive, tasks: Task, dts: FloatArray, n_steps: int) -> JointExecutions:
+    """What is known about executions before they begin.
+
+    Parameters
+    ----------
+    tasks : a batch (N) of tasks.
+    dts : (N) array, seconds.
+    n_steps : T.
+    """
+    steps, configuration = dts / tasks.duration, primitive.configuration
+    lasts = np.round(1 / steps).astype(np.intp)
+    length = max(n_steps, int(lasts.max()) + 1)
+    responses = np.stack([parameter_responses(configuration, float(step), length) for step in steps], axis=1)
+    rows = state_rows(responses, tasks.duration)
+    end_rows = rows[lasts, np.arange(len(steps)), POSITION]
+    return JointExecutions(joint_model(primitive, tasks, end_rows), rows[:n_steps])
+
+
+def mean_positions(executions: JointExecutions) -> FloatArray:
+    """Expected positions, (T, N, D) array, data units."""
+    model, positions = executions.model, executions.rows[:, :, POSITION]
+    means = model.means + np.matmul(model.factors, model.belief.mean[:, None, :, None])[..., 0]
+    return np.asarray(np.einsum("tkn,kdn->tkd", positions, means))
 
 
 def _start_and_parameters(primitive: Primitive) -> tuple[FloatArray, FloatArray]:

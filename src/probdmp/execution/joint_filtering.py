@@ -9,17 +9,14 @@ from typing import NamedTuple
 import numpy as np
 
 from probdmp.checks import FloatArray
-from probdmp.dmp import Primitive, Task
-from probdmp.dmp.joint_model import JointModel, joint_model, state_designs, state_rows
-from probdmp.dmp.responses import parameter_responses
+from probdmp.dmp import Primitive
+from probdmp.dmp.joint_model import JointExecutions, JointModel, state_designs
 from probdmp.dmp.transformation_system import POSITION
 from probdmp.gaussian import GaussianSequence, linear_moments, observe
 
 __all__ = [
     "FilteredRecordings",
-    "JointExecutions",
     "filter_joint",
-    "joint_executions",
     "joint_moments",
     "sample_joint",
     "state_moments",
@@ -37,33 +34,6 @@ class FilteredRecordings(NamedTuple):
     """(T, N, D, 1, 1) array: of each degree of freedom by itself."""
     log_likelihoods: FloatArray
     """(T, N, D) array, nats: the share of each degree of freedom in the log-likelihood of a time given the past."""
-
-
-class JointExecutions(NamedTuple):
-    """A batch of N executions, ready to be observed."""
-
-    model: JointModel
-    """With the batch axis (N)."""
-    rows: FloatArray
-    """(T, N, 3, n_basis + 3) array: each state as a function of what is unknown."""
-
-
-def joint_executions(primitive: Primitive, tasks: Task, dts: FloatArray, n_steps: int) -> JointExecutions:
-    """What is known about executions before they begin.
-
-    Parameters
-    ----------
-    tasks : a batch (N) of tasks.
-    dts : (N) array, seconds.
-    n_steps : T.
-    """
-    steps, configuration = dts / tasks.duration, primitive.configuration
-    lasts = np.round(1 / steps).astype(np.intp)
-    length = max(n_steps, int(lasts.max()) + 1)
-    responses = np.stack([parameter_responses(configuration, float(step), length) for step in steps], axis=1)
-    rows = state_rows(responses, tasks.duration)
-    end_rows = rows[lasts, np.arange(len(steps)), POSITION]
-    return JointExecutions(joint_model(primitive, tasks, end_rows), rows[:n_steps])
 
 
 def filter_joint(

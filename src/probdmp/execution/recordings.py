@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike
 from probdmp.checks import FloatArray, shape_text
 from probdmp.demonstrations import Demonstration, stack_positions
 from probdmp.dmp import Primitive, Task, linear_gaussian_model, stack_tasks, task_for
+from probdmp.dmp.joint_model import joint_executions
 from probdmp.errors import InputError, InputTypeError
-from probdmp.execution.joint_filtering import FilteredRecordings, filter_joint, joint_executions, joint_moments
+from probdmp.execution.joint_filtering import FilteredRecordings, filter_joint, joint_moments
 from probdmp.execution.trajectory import GaussianTrajectory, TrackedTrajectory
 from probdmp.gaussian import filter_sequence, smooth_sequence
 

@@ -4,8 +4,9 @@ import numpy as np
 
 from probdmp.checks import FloatArray
 from probdmp.dmp import Primitive, Task, linear_gaussian_model, stack_tasks, step_count
+from probdmp.dmp.joint_model import joint_executions
 from probdmp.dmp.transformation_system import POSITION
-from probdmp.execution.joint_filtering import joint_executions, joint_moments, sample_joint
+from probdmp.execution.joint_filtering import joint_moments, sample_joint
 from probdmp.execution.trajectory import GaussianTrajectory
 from probdmp.gaussian import filter_sequence, sample_sequences
 

@@ -7,10 +7,10 @@ import numpy as np
 
 from probdmp.checks import FloatArray
 from probdmp.dmp import Primitive, Task, linear_gaussian_model, stack_tasks
-from probdmp.dmp.joint_model import state_designs, state_rows
+from probdmp.dmp.joint_model import joint_executions, state_designs, state_rows
 from probdmp.dmp.responses import continue_responses, parameter_responses
 from probdmp.dmp.transformation_system import POSITION
-from probdmp.execution.joint_filtering import joint_executions, state_moments
+from probdmp.execution.joint_filtering import state_moments
 from probdmp.gaussian import observe, predict, update
 
 __all__ = ["STEP_FILTERS", "Sensed", "StepFilter"]

@@ -15,7 +15,7 @@ HALF_BAND = 1.96
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GaussianTrajectory:
-    """A Gaussian over acceleration, velocity and position at each time; degrees of freedom are independent."""
+    """A Gaussian over acceleration, velocity and position at each time, of each degree of freedom by itself."""
 
     times: FloatArray
     """(T,) array, seconds from the start."""
@@ -58,7 +58,7 @@ class GaussianTrajectory:
 
     @property
     def acceleration_stds(self) -> FloatArray:
-        """(T, D) array, data units per second squared; it grows as 1 / sqrt(dt), see `probdmp.dmp.state_space`."""
+        """(T, D) array, data units per second squared; with independent weights it grows as 1 / sqrt(dt)."""
         return self._stds(ACCELERATION)
 
     def _stds(self, row: int) -> FloatArray:
@@ -80,5 +80,5 @@ class TrackedTrajectory(GaussianTrajectory):
 
     @property
     def innovation_covariances(self) -> FloatArray:
-        """(T, D, D) array, data units squared: diagonal, since the sensors are independent."""
+        """(T, D, D) array, data units squared: diagonal; with joint weights, what degrees of freedom share is left out."""
         return self.innovation_variances[..., None] * np.eye(len(self.names))

@@ -8,6 +8,7 @@ import numpy as np
 from probdmp.checks import FloatArray
 from probdmp.demonstrations import Demonstration, mean_ranges, noise_stds, smooth_path, stack_positions
 from probdmp.dmp import Configuration, Primitive, Task, demonstrated_tasks, linear_gaussian_model
+from probdmp.dmp.joint_model import joint_executions, mean_positions
 from probdmp.dmp.transformation_system import POSITION
 from probdmp.errors import InputError
 from probdmp.gaussian import LinearGaussianModel, filter_sequence
@@ -43,17 +44,31 @@ def fit_primitive(
             for path, v, goal, d in zip(paths, velocities, tasks.goal, demonstrations, strict=True)
         ]
         moving = _regressed(still, pooled_weights(still, tasks, targets))
+    return _with_observation_noise(moving, tasks, demonstrations)
+
+
+def _with_observation_noise(
+    moving: Primitive, tasks: Task, demonstrations: Sequence[Demonstration]
+) -> tuple[Primitive, FitReport]:
+    """The primitive with its R, and how far its rollouts are from the demonstrations."""
     observed, dts = stack_positions(demonstrations), np.array([d.dt for d in demonstrations])
+    joint = moving.configuration.weight_uncertainty == "joint"
+    if joint and moving.variation is not None:  # R is what the variation leaves unexplained
+        squared_errors = _squared_errors(observed, mean_positions(joint_executions(moving, tasks, dts, len(observed))))
+        return moving, FitReport(np.sqrt(squared_errors) / moving.ranges, None)
     model = linear_gaussian_model(moving, tasks, dts, len(observed))
-    squared_errors = np.nanmean((observed - filter_sequence(model).filtered.means[..., POSITION]) ** 2, axis=0)
+    squared_errors = _squared_errors(observed, filter_sequence(model).filtered.means[..., POSITION])
     relative_errors = np.sqrt(squared_errors) / moving.ranges
-    if configuration.weight_uncertainty == "joint":
-        if moving.variation is None:  # then R is all that the mean movement leaves unexplained
-            least = OBSERVATION_NOISE_FLOOR * moving.ranges**2
-            moving = replace(moving, observation_variances=np.maximum(squared_errors.mean(axis=0), least))
-        return moving, FitReport(relative_errors, None)
+    if joint:  # R is what the mean movement leaves unexplained
+        variances = np.maximum(squared_errors.mean(axis=0), OBSERVATION_NOISE_FLOOR * moving.ranges**2)
+        return replace(moving, observation_variances=variances), FitReport(relative_errors, None)
     noise = _observation_noise(model, observed, squared_errors, moving.ranges)
     return replace(moving, observation_variances=noise.variances), FitReport(relative_errors, noise)
+
+
+def _squared_errors(observed: FloatArray, rollouts: FloatArray) -> FloatArray:
+    """Mean squared distance of each demonstration from its rollout, (K, D), data units squared."""
+    return np.asarray(np.nanmean((observed - rollouts) ** 2, axis=0))
 
 
 def _regressed(still: Primitive, posteriors: Sequence[WeightPosterior]) -> Primitive:
