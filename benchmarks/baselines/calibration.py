@@ -17,12 +17,14 @@ import numpy as np
 
 from baselines.array_types import FloatArray
 
-__all__ = ["Standardization", "conformal_threshold"]
+__all__ = ["Standardization", "threshold_for"]
 
 TAIL = 0.9
 """Statistics are made comparable at this quantile of their pooled scores."""
 LEAST = 1e-12
 """A scale below this is rounding."""
+ROUNDING = 1e-9
+"""101 · 0.99 is a little less than it should be."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,7 +48,14 @@ class Standardization:
         return np.asarray((statistics / (self.by_class[label] * self.pooled)).max(axis=-1))
 
 
-def conformal_threshold(scores: Sequence[float] | FloatArray, alpha: float) -> float:
-    """The level that a further exchangeable score exceeds with probability at most `alpha`; infinite if there are too few."""
-    rank = ceil((len(scores) + 1) * (1 - alpha) - 1e-9)
-    return float(np.sort(scores)[rank - 1]) if rank <= len(scores) else float("inf")
+def threshold_for(scores: Sequence[float] | FloatArray, alpha: float) -> float:
+    """The level that a further exchangeable score exceeds with probability at most `alpha`.
+
+    With too few scores for that, the largest of them: the attainable rate is then 1 / (n + 1).
+
+    Parameters
+    ----------
+    scores : (n,) array.
+    """
+    rank = ceil((len(scores) + 1) * (1 - alpha) - ROUNDING)
+    return float(np.sort(scores)[min(rank, len(scores)) - 1])

@@ -19,7 +19,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
 
-from baselines.alignment import Path, displacements
+from baselines.alignment import STEP, Path, displacements
 from baselines.array_types import FloatArray
 from baselines.method import GridMethod, extended
 
@@ -33,19 +33,27 @@ class HiddenMarkovLikelihood(GridMethod):
     """Log-likelihood under a left-right Gaussian hidden Markov model."""
 
     def __init__(
-        self, n_states: int = 20, floor: float = 0.03, windows: Sequence[int] = (1, 10), lag: int = 4, n_iterations: int = 10
+        self,
+        n_states: int = 20,
+        floor: float = 0.03,
+        phase: float = 1.0,
+        windows: Sequence[int] = (1, 10),
+        lag: int = 4,
+        n_iterations: int = 10,
     ) -> None:
         """
         Parameters
         ----------
         n_states : each lasts 1 / n_states of the duration on average.
         floor : least standard deviation within a state, extents.
+        phase : weight of the phase beside positions in extents; 0: the model alone knows how far the movement has come.
         windows : the log-likelihood of so many % of the duration is judged beside all of it.
         lag : displacements over so many % of the duration are observed beside positions.
         """
-        self.n_states, self.floor, self.windows, self.lag, self.n_iterations = n_states, floor, windows, lag, n_iterations
+        self.n_states, self.floor, self.phase, self.windows, self.lag, self.n_iterations = n_states, floor, phase, windows, lag, n_iterations
 
     def fit_paths(self, paths: Sequence[Path]) -> None:
+        self.last_phase = max(len(path.position) for path in paths) - 1
         observed = [self._observed(path) for path in paths]
         self.model = self._learned(observed)
         falls = extended([self._log_likelihoods(o) for o in observed])
@@ -59,7 +67,9 @@ class HiddenMarkovLikelihood(GridMethod):
         return np.maximum(fallen, 0)
 
     def _observed(self, path: Path) -> FloatArray:
-        return np.hstack([path.position, path.to_goal, displacements(path.position, self.lag)])
+        places = [path.position, path.to_goal, displacements(path.position, self.lag)]
+        phase = STEP * np.minimum(np.arange(len(path.position)), self.last_phase)
+        return np.column_stack([*places, self.phase * phase] if self.phase else places)
 
     def _learned(self, observed: Sequence[FloatArray]) -> GaussianHMM:
         n, n_features = self.n_states, observed[0].shape[1]

@@ -24,21 +24,28 @@ N_ITERATIONS = 50
 class MovementPrimitiveDistance(GridMethod):
     """Distance from a ProMP."""
 
-    def __init__(self, n_weights: int = 20, floor: float = 0.02, lags: Sequence[int] = (5,)) -> None:
+    def __init__(
+        self, n_weights: int = 12, floor: float = 0.02, shrinkage: float = 0.1, lags: Sequence[int] = (5,)
+    ) -> None:
         """
         Parameters
         ----------
         n_weights : basis functions per degree of freedom.
         floor : standard deviation of measured positions that is added to the primitive's, extents.
+        shrinkage : weight of a multiple of the identity in the covariance of the weights, which ten demonstrations do not
+            determine.
         lags : displacements over so many per cent of the duration are judged beside the position; none: position alone.
         """
-        self.n_weights, self.floor, self.lags = n_weights, floor, tuple(lags)
+        self.n_weights, self.floor, self.shrinkage, self.lags = n_weights, floor, shrinkage, tuple(lags)
 
     def fit_paths(self, paths: Sequence[Path]) -> None:
         positions = extended([path.position for path in paths])
         self.times = np.linspace(0, 1, positions.shape[1])
         self.promp = ProMP(positions.shape[2], self.n_weights)
         self.promp.imitate([self.times] * len(positions), list(positions), n_iter=N_ITERATIONS)
+        covariance, share = self.promp.weight_cov, self.shrinkage
+        shrunk = (1 - share) * covariance + share * np.trace(covariance) / len(covariance) * np.eye(len(covariance))
+        self.promp.from_weight_distribution(self.promp.weight_mean, shrunk)
 
     def trace_path(self, path: Path) -> FloatArray:
         n_dof = path.position.shape[1]

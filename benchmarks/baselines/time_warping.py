@@ -23,16 +23,17 @@ __all__ = ["TimeWarpingDistance"]
 class TimeWarpingDistance(GridMethod):
     """Open-end distance to the nearest training demonstration, in all and over the recent past."""
 
-    def __init__(self, window: int = 8, recent: int = 10, velocity: float = 1.0, lag: int = 4) -> None:
+    def __init__(self, window: int = 8, recent: int = 10, velocity: float = 2.0, goal: float = 1.0, lag: int = 4) -> None:
         """
         Parameters
         ----------
         window : how far tempo may differ, % of the duration.
         recent : the increase of the distance over so many % of the duration is judged beside all of it.
         velocity : weight of displacements beside positions; 0: positions alone.
+        goal : weight of the position from the goal, where one is commanded, beside that from the start.
         lag : displacements over so many % of the duration.
         """
-        self.window, self.recent, self.velocity, self.lag = window, recent, velocity, lag
+        self.window, self.recent, self.velocity, self.goal, self.lag = window, recent, velocity, goal, lag
 
     def fit_paths(self, paths: Sequence[Path]) -> None:
         self.references = [self._signals(path) for path in paths]
@@ -52,4 +53,4 @@ class TimeWarpingDistance(GridMethod):
         return np.asarray(np.square(paths[1 : len(signals) + 1].min(axis=1)))
 
     def _signals(self, path: Path) -> FloatArray:
-        return np.hstack([path.position, path.to_goal, self.velocity * displacements(path.position, self.lag)])
+        return np.hstack([path.position, self.goal * path.to_goal, self.velocity * displacements(path.position, self.lag)])
