@@ -99,7 +99,9 @@ def print_tables(evaluation: Evaluation, alpha: float) -> None:
     experiment = evaluation.experiment
     last = experiment.seed + experiment.seeds - 1
     seeds = f"seed {last}" if experiment.seeds == 1 else f"seeds {experiment.seed} to {last}"
-    CONSOLE.print(f"{experiment.train} training and {experiment.test} test demonstrations per class, task {experiment.task}, {seeds}")
+    CONSOLE.print(
+        f"{experiment.train} training and {experiment.test} test demonstrations per class, task {experiment.task}, {seeds}"
+    )
     _print_table(f"Calibrated for {100 * alpha:g} % false alarms", evaluation.summaries(), experiment.faults)
     for rate in REALIZED:
         title = f"At most {100 * rate:g} % false alarms realized"

@@ -50,7 +50,14 @@ class HiddenMarkovLikelihood(GridMethod):
         windows : the log-likelihood of so many % of the duration is judged beside all of it.
         lag : displacements over so many % of the duration are observed beside positions.
         """
-        self.n_states, self.floor, self.phase, self.windows, self.lag, self.n_iterations = n_states, floor, phase, windows, lag, n_iterations
+        self.n_states, self.floor, self.phase, self.windows, self.lag, self.n_iterations = (
+            n_states,
+            floor,
+            phase,
+            windows,
+            lag,
+            n_iterations,
+        )
 
     def fit_paths(self, paths: Sequence[Path]) -> None:
         self.last_phase = max(len(path.position) for path in paths) - 1

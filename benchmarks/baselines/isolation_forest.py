@@ -19,7 +19,9 @@ __all__ = ["WindowForest"]
 class WindowForest(GridMethod):
     """Anomaly score of windows."""
 
-    def __init__(self, lags: Sequence[int] = (3, 6, 9, 12), n_trees: int = 200, floor: float = 0.02, relative: bool = True) -> None:
+    def __init__(
+        self, lags: Sequence[int] = (3, 6, 9, 12), n_trees: int = 200, floor: float = 0.02, relative: bool = True
+    ) -> None:
         """
         Parameters
         ----------

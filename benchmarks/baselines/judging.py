@@ -78,16 +78,14 @@ def _raw_traces(make: Callable[[], Method], trial: Trial, task: str) -> _RawTrac
     )
 
 
-def _left_out_scores(
-    make: Callable[[], Method], training: Sequence[Demonstration], commands: Sequence[Command]
-) -> FloatArray:
+def _left_out_scores(make: Callable[[], Method], training: Sequence[Demonstration], commands: Sequence[Command]) -> FloatArray:
     n = len(training)
     part_of = np.arange(n) % (make().folds or n)
     scores: list[FloatArray] = [np.empty(0)] * n
     for part in np.unique(part_of):
-        kept = np.flatnonzero(part_of != part)
+        kept = np.flatnonzero(part_of != part).tolist()
         method = make().fit([training[k] for k in kept], [commands[k] for k in kept])
-        for k in np.flatnonzero(part_of == part):
+        for k in np.flatnonzero(part_of == part).tolist():
             scores[k] = method.trace(training[k], commands[k]).max(axis=0)
     return np.stack(scores)
 

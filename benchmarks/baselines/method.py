@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import ClassVar, Protocol, Self
+from typing import Protocol, Self
 
 import numpy as np
 
@@ -32,7 +32,7 @@ class Method(Protocol):
 class GridMethod(ABC):
     """A method that works on the common grid of phases."""
 
-    folds: ClassVar[int | None] = None
+    folds: int | None = None
 
     def fit(self, training: Sequence[Demonstration], commands: Sequence[Command]) -> Self:
         """Learn from undisturbed executions, each with its command."""

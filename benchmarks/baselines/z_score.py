@@ -20,21 +20,19 @@ __all__ = ["ZScoreBand"]
 class ZScoreBand(GridMethod):
     """Mean and standard deviation at each phase."""
 
-    def __init__(self, floor: float = 0.02, shrinkage: float = 0.2, lags: Sequence[int] = (5,)) -> None:
+    def __init__(self, floor: float = 0.02, lags: Sequence[int] = (5,)) -> None:
         """
         Parameters
         ----------
         floor : least standard deviation, extents.
-        shrinkage : weight of the variance averaged over phases and degrees of freedom; ten demonstrations estimate that of one
-            phase poorly.
         lags : displacements over so many per cent of the duration are judged beside the position; none: position alone.
         """
-        self.floor, self.shrinkage, self.lags = floor, shrinkage, tuple(lags)
+        self.floor, self.lags = floor, tuple(lags)
 
     def fit_paths(self, paths: Sequence[Path]) -> None:
         signals = [extended(columns) for columns in zip(*(self._signals(path) for path in paths), strict=True)]
         self.means = [s.mean(axis=0) for s in signals]
-        self.stds = [np.sqrt(self._shrunk(s.var(axis=0, ddof=1)) + self.floor**2) for s in signals]
+        self.stds = [np.hypot(s.std(axis=0, ddof=1), self.floor) for s in signals]
 
     def trace_path(self, path: Path) -> FloatArray:
         phase = np.minimum(np.arange(len(path.position)), len(self.means[0]) - 1)
@@ -43,9 +41,6 @@ class ZScoreBand(GridMethod):
             for signal, mean, std in zip(self._signals(path), self.means, self.stds, strict=True)
         ]
         return np.column_stack([score.max(axis=1) for score in scores])
-
-    def _shrunk(self, variance: FloatArray) -> FloatArray:
-        return (1 - self.shrinkage) * variance + self.shrinkage * variance.mean()
 
     def _signals(self, path: Path) -> list[FloatArray]:
         places = [p for p in (path.position, path.to_goal) if p.shape[1]]
