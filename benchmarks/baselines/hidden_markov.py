@@ -11,12 +11,12 @@ Source: Park, Erickson, Bhattacharjee & Kemp, "Multimodal execution monitoring f
 manipulation", ICRA 2016; the model is learned by the package `hmmlearn`.
 """
 
+import logging
 from collections.abc import Sequence
 
 import numpy as np
 from hmmlearn.hmm import GaussianHMM
 from scipy.ndimage import gaussian_filter1d
-from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
 
 from baselines.alignment import STEP, Path, displacements
@@ -24,6 +24,9 @@ from baselines.array_types import FloatArray
 from baselines.method import GridMethod, extended
 
 __all__ = ["HiddenMarkovLikelihood", "running_log_likelihoods"]
+
+# With a prior on covariances the likelihood alone may fall from one iteration to the next, which hmmlearn reports each time.
+logging.getLogger("hmmlearn").setLevel(logging.ERROR)
 
 SMOOTHING = 2.0
 """Mean and std over the training demonstrations are smoothed over so many % of the duration (std of the kernel)."""
@@ -39,7 +42,7 @@ class HiddenMarkovLikelihood(GridMethod):
         phase: float = 1.0,
         windows: Sequence[int] = (1, 10),
         lag: int = 4,
-        n_iterations: int = 10,
+        n_iterations: int = 5,
     ) -> None:
         """
         Parameters
@@ -71,7 +74,7 @@ class HiddenMarkovLikelihood(GridMethod):
     def trace_path(self, path: Path) -> FloatArray:
         phase = np.minimum(np.arange(len(path.position)), len(self.mean) - 1)
         fallen = (self.mean[phase] - self._log_likelihoods(self._observed(path))) / self.std[phase]
-        return np.maximum(fallen, 0)
+        return np.sqrt(np.maximum(fallen, 0))  # squared distances become distances
 
     def _observed(self, path: Path) -> FloatArray:
         places = [path.position, path.to_goal, displacements(path.position, self.lag)]
@@ -114,11 +117,12 @@ def running_log_likelihoods(model: GaussianHMM, observed: FloatArray) -> FloatAr
     emission = np.column_stack(
         [multivariate_normal(m, c).logpdf(observed) for m, c in zip(model.means_, model.covars_, strict=True)]
     )
-    with np.errstate(divide="ignore"):
-        start, transition = np.log(model.startprob_), np.log(model.transmat_)
-    alpha = start + emission[0]
-    total = [logsumexp(alpha)]
-    for frame in emission[1:]:
-        alpha = logsumexp(alpha[:, None] + transition, axis=0) + frame
-        total.append(logsumexp(alpha))
-    return np.array(total)
+    predicted, total = model.startprob_, []
+    for frame in emission:
+        with np.errstate(divide="ignore"):
+            joint = np.log(predicted) + frame
+        largest = joint.max()
+        alpha = np.exp(joint - largest)
+        total.append(largest + np.log(alpha.sum()))
+        predicted = alpha / alpha.sum() @ model.transmat_
+    return np.cumsum(total)

@@ -27,7 +27,7 @@ SMOOTHING = 2.0
 class TimeWarpingDistance(GridMethod):
     """Open-end distance to the nearest training demonstration, in all and over the recent past."""
 
-    def __init__(self, window: int = 8, recent: int = 10, velocity: float = 3.0, lag: int = 4, floor: float = 0.05) -> None:
+    def __init__(self, window: int = 8, recent: int = 10, velocity: float = 2.0, lag: int = 4, floor: float = 0.05) -> None:
         """
         Parameters
         ----------
