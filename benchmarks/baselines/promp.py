@@ -24,7 +24,7 @@ N_ITERATIONS = 50
 class MovementPrimitiveDistance(GridMethod):
     """Distance from a ProMP."""
 
-    def __init__(self, n_weights: int = 12, floor: float = 0.02, shrinkage: float = 0.1, lags: Sequence[int] = (5,)) -> None:
+    def __init__(self, n_weights: int = 12, floor: float = 0.02, shrinkage: float = 0.3, lags: Sequence[int] = (5,)) -> None:
         """
         Parameters
         ----------
