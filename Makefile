@@ -3,7 +3,9 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test test-slow lint types figures results variation clean
+BENCH := benchmarks/.venv
+
+.PHONY: demo test test-slow lint types figures results variation bench-env bench-detection clean
 
 demo: $(VENV)/.demo
 	$(BIN)/probdmp demo
@@ -33,8 +35,15 @@ results: $(VENV)/.demo
 variation: $(VENV)/.demo
 	$(BIN)/python docs/variation.py
 
+# Peers that the library is compared with live in an environment of their own.
+bench-env: $(BENCH)/.ready
+
+# Failure detectors against one another, on the recordings that PROBDMP_RECORDINGS points at; about five minutes.
+bench-detection: $(BENCH)/.ready
+	$(BENCH)/bin/python benchmarks/failure_detection.py "$(PROBDMP_RECORDINGS)/uci_letters/letters.npz"
+
 clean:
-	rm -rf $(VENV) build src/*.egg-info report.html
+	rm -rf $(VENV) $(BENCH) build src/*.egg-info report.html
 
 # A stamp per set of extras: installed again only when pyproject.toml changes.
 $(VENV)/.demo: EXTRA := plot
@@ -43,4 +52,9 @@ $(VENV)/.dev: EXTRA := dev
 $(VENV)/.%: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[$(EXTRA)]'
+	touch $@
+
+$(BENCH)/.ready: pyproject.toml benchmarks/requirements.txt
+	test -x $(BENCH)/bin/python || $(PYTHON) -m venv $(BENCH)
+	$(BENCH)/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[test]' -r benchmarks/requirements.txt
 	touch $@

@@ -1,0 +1,1 @@
+"""Failure detectors from the literature, under one protocol and one calibration."""
