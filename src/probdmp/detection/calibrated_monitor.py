@@ -12,8 +12,8 @@ from probdmp.execution import Observed
 
 __all__ = ["CalibratedMonitor"]
 
-LOOKED_AT_AGAIN = 10
-"""Moments after which an alarm is compared with the other primitives of the library again."""
+LOOKED_AT_AGAIN = (0, 4, 8, 12)
+"""Moments after an alarm at which its reason is looked for; later, what began it is out of sight."""
 
 
 class CalibratedMonitor:
@@ -86,12 +86,11 @@ class CalibratedMonitor:
     def _look_closer(self) -> None:
         """The reason as it looks now; that of a faulty sensor stands."""
         if self._verdict.kind not in ("sensor", "data missing"):
-            kind, cause = self._source.diagnose()
-            better = self._verdict.better
-            if self._n_since % LOOKED_AT_AGAIN == 0:
-                better = self._source.better()
+            if self._n_since in LOOKED_AT_AGAIN:
+                kind, cause = self._source.diagnose()
+                better = self._source.better() if kind == "motion" else ""
+                self._verdict = replace(self._verdict, kind=kind, cause=cause, better=better)
             self._n_since += 1
-            self._verdict = replace(self._verdict, kind=kind, cause=cause, better=better if kind == "motion" else "")
 
     def _note_sensor(self, observed: Observed) -> None:
         """A sensor fault explains what the movement seemed to do."""

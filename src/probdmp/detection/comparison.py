@@ -18,6 +18,8 @@ COMPARED_EVERY = 4
 """Ticks between the points that are compared; those between say little more."""
 MARGIN = 3.0
 """Nats by which another primitive has to be likelier."""
+PLAUSIBLE = 2.0
+"""Mean squared deviation up to which an execution may be one of another primitive."""
 
 
 class Candidate:
@@ -33,8 +35,8 @@ class Candidate:
     def __init__(self, model: PathModel, ranges: FloatArray, duration: float) -> None:
         self._model, self._ranges, self._duration = model, ranges, duration
 
-    def log_density(self, times: FloatArray, displacements: FloatArray) -> float:
-        """Of displacements (n, D) in data units at times (n,) in seconds: of a multivariate t, nats."""
+    def log_density(self, times: FloatArray, displacements: FloatArray) -> tuple[float, float]:
+        """Of displacements (n, D) in data units at times (n,) in seconds, of a multivariate t, nats; and their mean square."""
         phases = np.clip(np.rint(TICKS * times / self._duration).astype(int), 0, TICKS)
         size = displacements.size
         residuals = (displacements / self._ranges - self._model.means[phases]).ravel()
@@ -44,7 +46,7 @@ class Candidate:
         nu = DEGREES_OF_FREEDOM
         scale = float(np.log(np.diag(factor)).sum() + len(times) * np.log(self._ranges).sum())
         shape = lgamma((nu + size) / 2) - lgamma(nu / 2) - size / 2 * log(nu * pi)
-        return shape - scale - (nu + size) / 2 * float(np.log1p(square / nu))
+        return shape - scale - (nu + size) / 2 * float(np.log1p(square / nu)), square / size
 
 
 class Comparison:
@@ -73,9 +75,10 @@ class Comparison:
         rivals = [label for label, p in self._primitives.items() if p.names == own.names]
         if len(seen) < 2 or len(rivals) < 2:
             return ""
-        densities = {label: self._candidate(label).log_density(times[seen], displacements[seen]) for label in rivals}
-        best = max(densities, key=lambda label: densities[label])
-        return best if densities[best] > densities[self._labels[own.identity]] + MARGIN else ""
+        fits = {label: self._candidate(label).log_density(times[seen], displacements[seen]) for label in rivals}
+        best = max(fits, key=lambda label: fits[label][0])
+        clearly = fits[best][0] > fits[self._labels[own.identity]][0] + MARGIN
+        return best if clearly and fits[best][1] < PLAUSIBLE else ""
 
     def _candidate(self, label: str) -> Candidate:
         if label not in self._candidates:

@@ -1,8 +1,14 @@
-"""Why an execution was called failed, from where it has been lately.
+"""Why an execution was called failed: where it goes, or when it gets there.
 
-What has not moved for `REST_TICKS` ticks is held. Otherwise the last `LOOKED_BACK` ticks are compared with the mean path run through
-at several speeds, from every phase: an execution that is on its path, but at another time or speed than it should be, is
-slow or fast; one that is nowhere on it is off the path.
+What has not moved lately is held. Otherwise explanations compete, each with an onset o some ticks ago:
+
+    pace     the movement as taught, but since o at speed r for w ticks: tick u of the execution is phase phi(u) of the movement,
+             phi(u) = u until o, then o + r (u - o), and after w ticks on again as before, but late or early
+    aside    the movement on time, but since o pushed aside: y(u) = path(u) + b g(u - o), b ~ N(0, ASIDE_STD^2 I), g rising to 1
+             for good, or for a while
+
+Under each the execution is a draw from a Gaussian over paths. The explanation with the largest density wins; a pace also has to
+explain what came after its onset about as well as ordinary executions are explained.
 """
 
 from collections.abc import Sequence
@@ -13,21 +19,30 @@ import numpy as np
 from probdmp.checks import FloatArray
 from probdmp.detection.path_model import PathModel
 from probdmp.detection.phase_clock import TICKS
+from probdmp.detection.trajectory_statistics import DEGREES_OF_FREEDOM
 
-__all__ = ["Diagnosis", "diagnose"]
+__all__ = ["LOOKED_AT", "Diagnosis", "diagnose"]
 
 REST_TICKS = 8
 REST_EXTENT = 0.004
 """Root mean square by which what is held still moves, as a fraction of the range, besides 1.5 times the noise."""
-LOOKED_BACK = (0, 4, 8, 12)
+LOOKED_AT = np.array([84, 74, 64, 54, 46, 38, 31, 25, 20, 16, 12, 8, 5, 2, 0])
 """Ticks before now at which an execution is compared with its path."""
-SPEEDS = np.array([0.25, 0.4, 0.5, 0.6, 0.75, 0.9, 1.0, 1.15, 1.35, 1.6, 2.0])
-ON_PATH = 2.5
-"""Mean squared distance per degree of freedom up to which an execution is on its path."""
-UNREMARKABLE_LAG = 4
-"""Ticks by which ordinary executions are early or late."""
-REMARKABLE_GAIN = 0.5
-"""Another timing has to leave less than this share of the squared distance to be the reason."""
+ONSETS = np.array([4, 8, 12, 16, 21, 27, 34, 42, 52, 64])
+"""Ticks before now at which the pace may have changed."""
+SPEEDS = np.array([0.25, 0.5, 0.75, 1.33, 2.0])
+PAUSES = np.array([5, 10, 15, 20])
+"""Ticks that a movement may have been held before it went on."""
+RISES = np.array([6, 20, 50])
+"""Ticks in which a movement may be pushed aside."""
+WIDTHS = np.array([10, 20, 35])
+"""Ticks in which it may be pushed aside and come back."""
+ASIDE_STD = 0.3
+"""How far it may be, as a fraction of the range."""
+FOLLOWS = 5.0
+"""Squared deviation per number, relative to the sloppiness before, up to which what came later follows from what came before."""
+CLEARLY = 6.0
+"""Nats by which an uneven pace has to be likelier than an even one."""
 
 
 class Diagnosis(NamedTuple):
@@ -38,47 +53,93 @@ class Diagnosis(NamedTuple):
     cause: str
 
 
-def diagnose(model: PathModel, means: FloatArray, tick: int, recent: Sequence[FloatArray], noise_stds: FloatArray) -> Diagnosis:
+def diagnose(model: PathModel, means: FloatArray, recent: Sequence[FloatArray], tick: int, noise_stds: FloatArray) -> Diagnosis:
     """Motion or timing, and what in particular.
 
     Parameters
     ----------
     means : (M, D) array, mean path of the execution.
-    tick : ticks since the start.
     recent : displacements (D,) at the last ticks, the latest last.
+    tick : of the latest, since the start.
     noise_stds : (D,) array, noise of the sensor as a fraction of the range.
     """
+    if _is_at_rest(recent, noise_stds):
+        return Diagnosis("timing", "held")
+    back = np.array([j for j in LOOKED_AT if j < len(recent) and not np.isnan(recent[-1 - j]).any()], dtype=int)
+    explanations = _explanations(int(back.max()) if len(back) else 0)
+    if len(explanations.onsets) < 2:
+        return Diagnosis("motion", "off the path")
+    density, follows = _fit(model, means, np.stack([recent[-1 - j] for j in back]), tick - back, tick, explanations)
+    best, speed = int(np.argmax(density)), float(explanations.speeds[np.argmax(density)])
+    if speed == 1 or density[best] < density[0] + CLEARLY or follows[best] > FOLLOWS:
+        return Diagnosis("motion", "off the path")
+    if speed == 0:
+        return Diagnosis("timing", "paused")
+    return Diagnosis("timing", "slow" if speed < 1 else "fast")
+
+
+def _is_at_rest(recent: Sequence[FloatArray], noise_stds: FloatArray) -> bool:
     latest = np.stack(list(recent)[-REST_TICKS:])
     latest = latest[~np.isnan(latest).any(axis=1)]
-    if len(latest) >= REST_TICKS // 2:
-        extents = np.sqrt(np.mean((latest - latest.mean(axis=0)) ** 2, axis=0))
-        if np.all(extents < REST_EXTENT + 1.5 * noise_stds):
-            return Diagnosis("timing", "held")
-    distances = _distances(model, means, recent)
-    if distances is None:
-        return Diagnosis("motion", "off the path")
-    best = np.unravel_index(np.nanargmin(distances), distances.shape)
-    speed, phase = float(SPEEDS[best[0]]), int(best[1])
-    on_time = np.abs(np.arange(TICKS + 1) - min(tick, TICKS)) <= UNREMARKABLE_LAG
-    ordinary = float(np.nanmin(distances[int(np.flatnonzero(SPEEDS == 1.0)[0]), on_time]))
-    if distances[best] > ON_PATH or distances[best] > REMARKABLE_GAIN * ordinary:
-        return Diagnosis("motion", "off the path")
-    late = tick - phase
-    if late > UNREMARKABLE_LAG or (late >= 0 and speed < 1):
-        return Diagnosis("timing", "slow")
-    return Diagnosis("timing", "fast")
+    if len(latest) < REST_TICKS // 2:
+        return False
+    extents = np.sqrt(np.mean((latest - latest.mean(axis=0)) ** 2, axis=0))
+    return bool(np.all(extents < REST_EXTENT + 1.5 * noise_stds))
 
 
-def _distances(model: PathModel, means: FloatArray, recent: Sequence[FloatArray]) -> FloatArray | None:
-    """Mean squared distance per degree of freedom from the path run through at each speed, up to each phase: (speeds, M)."""
-    back = [j for j in LOOKED_BACK if j < len(recent) and not np.isnan(recent[-1 - j]).any()]
-    if not back:
-        return None
-    dof, ticks = means.shape[1], np.arange(TICKS + 1)
-    variances = model.covariance[ticks, :, ticks] + np.diag(model.noise_variances)
-    total = np.zeros((len(SPEEDS), TICKS + 1))
-    for j in back:
-        residuals = recent[-1 - j] - means
-        squares = np.sum(residuals * np.linalg.solve(variances, residuals[..., None])[..., 0], axis=-1) / dof
-        total += squares[np.clip(np.rint(ticks - SPEEDS[:, None] * j).astype(int), 0, TICKS)]
-    return total / len(back)
+class _Explanations(NamedTuple):
+    """(E,) arrays, one entry for each; the first is that nothing happened."""
+
+    onsets: FloatArray
+    """Ticks before now."""
+    speeds: FloatArray
+    lengths: FloatArray
+    """Ticks at that speed."""
+    rises: FloatArray
+    """Ticks in which the movement is pushed aside for good; infinite if it is not."""
+    widths: FloatArray
+    """Ticks in which it is pushed aside and comes back; 0 if it is not."""
+
+
+def _explanations(longest: int) -> _Explanations:
+    onsets = [onset for onset in ONSETS if onset < longest]
+    nothing = [(0, 1.0, 0, np.inf, 0)]
+    paces = [(o, r, 10 * TICKS, np.inf, 0) for o in onsets for r in SPEEDS]
+    pauses = [(o, 0.0, w, np.inf, 0) for o in onsets for w in PAUSES if w < o]
+    aside = [(o, 1.0, 0, rise, 0) for o in onsets for rise in RISES]
+    pushes = [(o, 1.0, 0, np.inf, width) for o in onsets for width in WIDTHS]
+    return _Explanations(*np.array(nothing + paces + pauses + aside + pushes).T)
+
+
+def _fit(
+    model: PathModel, means: FloatArray, path: FloatArray, ticks: FloatArray, now: int, explanations: _Explanations
+) -> tuple[FloatArray, FloatArray]:
+    """How well each explanation fits a path (P, D) at its ticks (P,).
+
+    Returns
+    -------
+    Log-density of a multivariate t but for a constant; squared deviation per number after the onset, relative to that before.
+    (E,) arrays.
+    """
+    (points, dof), count = path.shape, len(explanations.onsets)
+    since = np.maximum(ticks - (now - explanations.onsets[:, None]), 0)  # ticks since the onset, (E, P)
+    lost = (1 - explanations.speeds[:, None]) * np.minimum(since, explanations.lengths[:, None])
+    phases = np.clip(np.rint(ticks - lost).astype(int), 0, TICKS)
+    widths = explanations.widths[:, None]
+    bumps = np.where(since < widths, np.sin(np.pi * since / np.maximum(widths, 1)) ** 2, 0.0)
+    aside = ASIDE_STD * (np.minimum(since / explanations.rises[:, None], 1.0) + bumps)
+    whole = model.covariance.transpose(0, 2, 1, 3)  # (M, M, D, D)
+    blocks = whole[phases[:, :, None], phases[:, None, :]]
+    blocks = blocks + (aside[:, :, None] * aside[:, None, :])[..., None, None] * np.eye(dof)
+    covariances = blocks.transpose(0, 1, 3, 2, 4).reshape(count, points * dof, -1)
+    factors = np.linalg.cholesky(covariances + np.diag(np.tile(model.noise_variances, points)))
+    residuals = (path - means[phases]).reshape(count, -1, 1)
+    squares = np.linalg.solve(factors, residuals).reshape(count, points, dof) ** 2
+    nu, size = DEGREES_OF_FREEDOM, points * dof
+    determinants = np.log(np.diagonal(factors, axis1=-2, axis2=-1)).sum(axis=-1)
+    density = -determinants - (nu + size) / 2 * np.log1p(squares.sum(axis=(1, 2)) / nu)
+    later = since > 0
+    after = np.where(later[:, :, None], squares, 0.0).sum(axis=(1, 2))
+    n_after = dof * later.sum(axis=1)
+    sloppiness = (nu + squares.sum(axis=(1, 2)) - after) / (nu + size - n_after)
+    return density, after / np.maximum(n_after, 1) / sloppiness

@@ -15,8 +15,8 @@ JUMP_FACTOR = 3.0
 """A sample is suspicious from so many times the largest jump of the demonstrations."""
 LEAST_JUMP = 0.05
 """And at least this fraction of the range."""
-SPIKES = 3
-"""So many spikes in an execution make a sensor fault."""
+SPIKES = 2
+"""So many spikes in an execution, of all degrees of freedom, make a sensor fault."""
 REPEAT_FACTOR = 2.0
 """A sensor is stuck from so many times the longest repetition of the demonstrations."""
 LEAST_REPEATS = 5
@@ -54,7 +54,7 @@ class SensorWatch:
         """What is wrong, in a word or two; nothing if nothing is."""
         if np.any(self.repeats > self._most_repeats):
             return "stuck"
-        return "spikes" if np.any(self.spikes >= SPIKES) else ""
+        return "spikes" if self.spikes.sum() >= SPIKES else ""
 
     @property
     def is_stale(self) -> bool:

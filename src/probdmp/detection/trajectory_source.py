@@ -1,12 +1,13 @@
 """The trajectory of one execution as a source of channel values."""
 
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
 
 from probdmp.checks import FloatArray
 from probdmp.detection.comparison import Comparison
-from probdmp.detection.diagnosis import Diagnosis, diagnose
+from probdmp.detection.diagnosis import LOOKED_AT, Diagnosis, diagnose
 from probdmp.detection.execution_ticks import ExecutionTicks
 from probdmp.detection.phase_clock import TICKS
 from probdmp.detection.profile import ExecutionProfile
@@ -17,6 +18,7 @@ from probdmp.execution import Observed
 
 __all__ = ["Expectation", "TrajectorySource"]
 
+LOOKED_BACK = int(LOOKED_AT.max()) + 1
 REMEMBERED = 2 * TICKS
 """Ticks from the start that are compared with other primitives."""
 
@@ -51,6 +53,7 @@ class TrajectorySource:
         self._tick = -1
         self._task = task
         self._history: list[FloatArray] = []
+        self._recent: deque[FloatArray] = deque(maxlen=LOOKED_BACK)
 
     def update(self, observed: Observed) -> list[FloatArray]:
         """Values at the ticks of the phase clock that are complete now."""
@@ -60,6 +63,7 @@ class TrajectorySource:
         if self._follower is None:
             self._follower = self._expectation.trajectory.follow(self._ticks.goal)
         self._tick += 1
+        self._recent.append(displacement)
         if len(self._history) <= REMEMBERED:
             self._history.append(displacement)
         if self._values is None:
@@ -84,7 +88,7 @@ class TrajectorySource:
         if self._follower is None:
             return Diagnosis("motion", "off the path")
         noise = self._expectation.profile.noise_stds / self._expectation.primitive.ranges
-        return diagnose(self._expectation.trajectory.model, self._follower.means, self._tick, self._follower.recent, noise)
+        return diagnose(self._expectation.trajectory.model, self._follower.means, self._recent, self._tick, noise)
 
     def better(self) -> str:
         """Label of the primitive of the library that fits better, if there is one."""
