@@ -18,7 +18,7 @@ from probdmp.dmp import Primitive, path_distribution
 
 __all__ = ["PathModel", "path_model"]
 
-NOISE_FLOOR = 0.005
+NOISE_FLOOR = 0.01
 """Standard deviation of what a path is measured with at the least, as a fraction of the range."""
 
 

@@ -17,11 +17,14 @@ LEAST_JUMP = 0.05
 """And at least this fraction of the range."""
 SPIKES = 2
 """So many spikes in an execution, of all degrees of freedom, make a sensor fault."""
-REPEAT_FACTOR = 2.0
-"""A sensor is stuck from so many times the longest repetition of the demonstrations."""
-LEAST_REPEATS = 5
-LEAST_REPEAT_SHARE = 0.04
-"""And at least so many samples and this fraction of the duration."""
+LEAST_REPEATS = 8
+LEAST_REPEAT_SHARE = 0.08
+"""A sensor is stuck from so many exact repeats and this fraction of the duration, if the demonstrations have none."""
+COARSE_REPEATS = 2
+"""Where the demonstrations have more repeats than this in a row, the sensor is coarse, or they rest exactly."""
+COARSE_FACTOR = 3.0
+COARSE_SHARE = 0.15
+"""Such a sensor is stuck from so many times the longest of these repetitions and this fraction of the duration."""
 SILENCE_SHARE = 0.1
 """Nothing measured for this fraction of the duration: the execution can no longer be judged."""
 
@@ -39,8 +42,11 @@ class SensorWatch:
     def __init__(self, profile: ExecutionProfile, ranges: FloatArray, duration: float, dt: float) -> None:
         n_dof = len(ranges)
         self._largest_jumps = np.maximum(JUMP_FACTOR * profile.largest_jumps, LEAST_JUMP * ranges)
-        self._most_repeats = np.maximum(
-            REPEAT_FACTOR * profile.longest_repeats / dt, max(LEAST_REPEATS, LEAST_REPEAT_SHARE * duration / dt)
+        longest = profile.longest_repeats / dt
+        self._most_repeats = np.where(
+            longest > COARSE_REPEATS,
+            np.maximum(COARSE_FACTOR * longest, COARSE_SHARE * duration / dt),
+            max(LEAST_REPEATS, LEAST_REPEAT_SHARE * duration / dt),
         )
         self._most_silent = max(SILENCE_SHARE * duration / dt, 2.0)
         self._believed = np.full((2, n_dof), np.nan)
