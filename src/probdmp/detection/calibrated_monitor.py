@@ -87,7 +87,7 @@ class CalibratedMonitor:
         """The reason as it looks now; that of a faulty sensor stands."""
         if self._verdict.kind not in ("sensor", "data missing"):
             if self._n_since in LOOKED_AT_AGAIN:
-                kind, cause = self._source.diagnose()
+                kind, cause = self._source.diagnose(self._n_since)
                 better = self._source.better() if kind == "motion" else ""
                 self._verdict = replace(self._verdict, kind=kind, cause=cause, better=better)
             self._n_since += 1

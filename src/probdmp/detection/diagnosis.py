@@ -23,7 +23,8 @@ from probdmp.detection.trajectory_statistics import DEGREES_OF_FREEDOM
 
 __all__ = ["LOOKED_AT", "Diagnosis", "diagnose"]
 
-REST_TICKS = 8
+REST_TICKS = (4, 8)
+"""Ticks without movement that make a standstill: at the alarm, and once there was time to see."""
 REST_EXTENT = 0.004
 """Root mean square by which what is held still moves, as a fraction of the range, besides 1.5 times the noise."""
 LOOKED_AT = np.array([84, 74, 64, 54, 46, 38, 31, 25, 20, 16, 12, 8, 5, 2, 0])
@@ -53,7 +54,9 @@ class Diagnosis(NamedTuple):
     cause: str
 
 
-def diagnose(model: PathModel, means: FloatArray, recent: Sequence[FloatArray], tick: int, noise_stds: FloatArray) -> Diagnosis:
+def diagnose(
+    model: PathModel, means: FloatArray, recent: Sequence[FloatArray], tick: int, noise_stds: FloatArray, seen_since: int
+) -> Diagnosis:
     """Motion or timing, and what in particular.
 
     Parameters
@@ -62,8 +65,9 @@ def diagnose(model: PathModel, means: FloatArray, recent: Sequence[FloatArray], 
     recent : displacements (D,) at the last ticks, the latest last.
     tick : of the latest, since the start.
     noise_stds : (D,) array, noise of the sensor as a fraction of the range.
+    seen_since : ticks since the alarm.
     """
-    if _is_at_rest(recent, noise_stds):
+    if _is_at_rest(list(recent)[-min(REST_TICKS[0] + seen_since, REST_TICKS[1]) :], noise_stds):
         return Diagnosis("timing", "held")
     back = np.array([j for j in LOOKED_AT if j < len(recent) and not np.isnan(recent[-1 - j]).any()], dtype=int)
     explanations = _explanations(int(back.max()) if len(back) else 0)
@@ -79,9 +83,9 @@ def diagnose(model: PathModel, means: FloatArray, recent: Sequence[FloatArray], 
 
 
 def _is_at_rest(recent: Sequence[FloatArray], noise_stds: FloatArray) -> bool:
-    latest = np.stack(list(recent)[-REST_TICKS:])
+    latest = np.stack(recent)
     latest = latest[~np.isnan(latest).any(axis=1)]
-    if len(latest) < REST_TICKS // 2:
+    if len(latest) < REST_TICKS[0]:
         return False
     extents = np.sqrt(np.mean((latest - latest.mean(axis=0)) ** 2, axis=0))
     return bool(np.all(extents < REST_EXTENT + 1.5 * noise_stds))

@@ -35,8 +35,8 @@ class Source(Protocol):
         """(D,) array: signed squared deviation of each degree of freedom in a channel at the last moment."""
         ...
 
-    def diagnose(self) -> Diagnosis:
-        """What seems to have happened, given that something has."""
+    def diagnose(self, seen_since: int) -> Diagnosis:
+        """What seems to have happened, as seen so many moments after the alarm."""
         ...
 
     def better(self) -> str:
@@ -87,7 +87,7 @@ class InnovationSource:
             return np.zeros(len(self._ranges))
         return signed_squares(self._last)
 
-    def diagnose(self) -> Diagnosis:
+    def diagnose(self, seen_since: int) -> Diagnosis:
         """Innovations do not tell why."""
         return Diagnosis("motion", "unexpected innovations")
 

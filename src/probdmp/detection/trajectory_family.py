@@ -16,7 +16,7 @@ from probdmp.detection.profile import ExecutionProfile
 from probdmp.detection.trajectory_model import TrajectoryModel
 from probdmp.detection.trajectory_source import Expectation, TrajectorySource
 from probdmp.detection.trajectory_statistics import CHANNELS
-from probdmp.dmp import Primitive, Task
+from probdmp.dmp import Primitive, Task, Variation
 from probdmp.dmp.phase import phases_at
 from probdmp.errors import InputError
 from probdmp.execution import Observed
@@ -45,6 +45,7 @@ class TrajectoryFamily:
         self.profiles = profiles
         self._others = Comparison(primitives, profiles)
         self._expectations: dict[tuple[str, bool], Expectation] = {}
+        self._left_out: dict[str, list[Variation]] = {}
 
     @classmethod
     def fit(cls, library: Library) -> Self:
@@ -84,7 +85,9 @@ class TrajectoryFamily:
         primitive, knows_goal = member.primitive, tells_goal(tasks[0])
         profile = self.profiles[primitive.identity]
         maxima = []
-        variations = left_out_variations(primitive, member.recordings)
+        if primitive.identity not in self._left_out:
+            self._left_out[primitive.identity] = list(left_out_variations(primitive, member.recordings))
+        variations = self._left_out[primitive.identity]
         for variation, task, recording in zip(variations, tasks, member.recordings, strict=True):
             others = replace(primitive, variation=variation)
             trajectory = TrajectoryModel(path_model(others, profile, knows_goal))

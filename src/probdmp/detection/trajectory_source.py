@@ -83,12 +83,13 @@ class TrajectorySource:
         window = self._follower.window(self._tick, offsets)[0, 0]
         return judge.contributions(self._tick, unshifted, window, self._follower.means)
 
-    def diagnose(self) -> Diagnosis:
+    def diagnose(self, seen_since: int) -> Diagnosis:
         """From the last ticks."""
         if self._follower is None:
             return Diagnosis("motion", "off the path")
         noise = self._expectation.profile.noise_stds / self._expectation.primitive.ranges
-        return diagnose(self._expectation.trajectory.model, self._follower.means, self._recent, self._tick, noise)
+        model = self._expectation.trajectory.model
+        return diagnose(model, self._follower.means, self._recent, self._tick, noise, seen_since)
 
     def better(self) -> str:
         """Label of the primitive of the library that fits better, if there is one."""
