@@ -59,9 +59,9 @@ class CalibratedMonitor:
         return self._ratio
 
     def _judge(self, observed: Observed, values: FloatArray) -> None:
-        surprises = self._calibration.surprise(values)
-        channel = int(np.argmax(surprises))
-        self._ratio = float(surprises[channel] / self._calibration.threshold)
+        surprises = self._calibration.surprises_now(values)
+        channel = max(range(len(surprises)), key=surprises.__getitem__)
+        self._ratio = surprises[channel] / self._calibration.threshold
         self._n_above = self._n_above + 1 if self._ratio > 1 else 0
         if self._is_latched:
             self._look_closer()

@@ -38,6 +38,8 @@ class Family(Protocol):
 
     @property
     def channels(self) -> tuple[str, ...]: ...
+    @property
+    def floors(self) -> FloatArray: ...
     def source(self, primitive: Primitive, task: Task, dt: float) -> Source: ...
     def replay(
         self, primitive: Primitive, tasks: Sequence[Task], recordings: Sequence[Demonstration]
@@ -134,7 +136,7 @@ class CalibratedRule:
                 family = InnovationFamily(options.statistic)
             calibrations = {
                 knows_goal: {
-                    label: _restored(values, options, len(family.channels))
+                    label: _restored(values, options, family)
                     for label, values in state["calibrations"][mode].items()
                 }
                 for knows_goal, mode in MODES.items()
@@ -186,12 +188,12 @@ def _calibrate(
     of_each = {label: [label] * len(values) for label, values in maxima.items()}
     rate, method = options.false_alarm_rate, options.calibration
     if not options.pooled:
-        return {label: Calibration(maxima[label], of_each[label], rate, method) for label in labels}
-    pooled = Calibration(np.concatenate(found), [name for label in labels for name in of_each[label]], rate, method)
-    return {POOLED: pooled}
+        return {label: Calibration(maxima[label], of_each[label], rate, method, family.floors) for label in labels}
+    names = [name for label in labels for name in of_each[label]]
+    return {POOLED: Calibration(np.concatenate(found), names, rate, method, family.floors)}
 
 
-def _restored(values: Mapping[str, Any], options: DetectorOptions, n_channels: int) -> Calibration:
+def _restored(values: Mapping[str, Any], options: DetectorOptions, family: Family) -> Calibration:
     labels = [str(label) for label in values["labels"]]
-    maxima = check_array(values["maxima"], "maxima", (len(labels), n_channels))
-    return Calibration(maxima, labels, options.false_alarm_rate, options.calibration)
+    maxima = check_array(values["maxima"], "maxima", (len(labels), len(family.channels)))
+    return Calibration(maxima, labels, options.false_alarm_rate, options.calibration, family.floors)

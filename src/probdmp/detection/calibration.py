@@ -12,9 +12,11 @@ rate below 1 / (n + 1).
 Sources: Vovk, Gammerman & Shafer, Algorithmic Learning in a Random World; Hill, Annals of Statistics 3 (1975).
 """
 
+from bisect import bisect_left
 from collections import Counter
 from collections.abc import Sequence
 from functools import cached_property
+from math import log
 
 import numpy as np
 
@@ -44,15 +46,20 @@ class Calibration:
     labels : (n) which primitive each execution was of.
     false_alarm_rate : alpha, of executions, in (0, 1).
     method : a name from `CALIBRATIONS`: where the executions come from.
+    floors : (C,) array: up to these values nothing is suspicious.
     """
 
-    def __init__(self, maxima: FloatArray, labels: Sequence[str], false_alarm_rate: float, method: str) -> None:
+    def __init__(
+        self, maxima: FloatArray, labels: Sequence[str], false_alarm_rate: float, method: str, floors: FloatArray | float = 0.0
+    ) -> None:
         self.maxima, self.labels = np.nan_to_num(maxima), tuple(labels)
         self.false_alarm_rate, self.method = false_alarm_rate, method
         if len(self.maxima) < 2 or len(self.maxima) != len(self.labels):
             raise InputError("at least two calibration executions, each with a label", f"{len(self.maxima)}")
         self._sorted = np.sort(self.maxima, axis=0)
-        self._starts = np.maximum(np.quantile(self.maxima, 1 - TAIL_SHARE, axis=0), np.finfo(float).tiny)
+        self._ranked = self._sorted.T.tolist()
+        least = np.maximum(floors, np.finfo(float).tiny)
+        self._starts = np.maximum(np.quantile(self.maxima, 1 - TAIL_SHARE, axis=0), least)
         beyond = self.maxima > self._starts
         excesses = np.where(beyond, np.log(np.maximum(self.maxima, self._starts) / self._starts), 0.0)
         self._exponents = (excesses.sum(axis=0) + TAIL_PRIOR) / (beyond.sum(axis=0) + 1)
@@ -98,6 +105,17 @@ class Calibration:
         by_rank = np.minimum(-np.log((ranks + 1) / (self.n + 1)), self._tail_surprises)
         tail = np.log(np.maximum(filled, self._starts) / self._starts) / self._exponents
         return np.where(filled > self._starts, self._tail_surprises + tail, by_rank)
+
+    def surprises_now(self, values: FloatArray) -> list[float]:
+        """The same for the values (C,) of one moment, fast enough for a control loop."""
+        return [self._surprise_of(channel, float(value)) for channel, value in enumerate(values)]
+
+    def _surprise_of(self, channel: int, value: float) -> float:
+        start = self._starts[channel]
+        if value > start:
+            return float(self._tail_surprises[channel] + log(value / start) / self._exponents[channel])
+        above = self.n - (bisect_left(self._ranked[channel], value) if value > 0 else 0)
+        return float(min(-log((above + 1) / (self.n + 1)), self._tail_surprises[channel]))
 
     def _threshold(self) -> tuple[float, bool]:
         alpha, ordered = self.false_alarm_rate, np.sort(self.statistics)

@@ -27,6 +27,8 @@ REST_TICKS = (4, 8)
 """Ticks without movement that make a standstill: at the alarm, and once there was time to see."""
 REST_EXTENT = 0.004
 """Root mean square by which what is held still moves, as a fraction of the range, besides 1.5 times the noise."""
+LEAST_DUE = 0.03
+"""What rests is held if it should have moved at least so far, as a fraction of the range."""
 LOOKED_AT = np.array([84, 74, 64, 54, 46, 38, 31, 25, 20, 16, 12, 8, 5, 2, 0])
 """Ticks before now at which an execution is compared with its path."""
 ONSETS = np.array([4, 8, 12, 16, 21, 27, 34, 42, 52, 64])
@@ -67,7 +69,8 @@ def diagnose(
     noise_stds : (D,) array, noise of the sensor as a fraction of the range.
     seen_since : ticks since the alarm.
     """
-    if _is_at_rest(list(recent)[-min(REST_TICKS[0] + seen_since, REST_TICKS[1]) :], noise_stds):
+    n_rest = min(REST_TICKS[0] + seen_since, REST_TICKS[1])
+    if _is_held(means, list(recent), tick, REST_EXTENT + 1.5 * noise_stds, n_rest):
         return Diagnosis("timing", "held")
     back = np.array([j for j in LOOKED_AT if j < len(recent) and not np.isnan(recent[-1 - j]).any()], dtype=int)
     explanations = _explanations(int(back.max()) if len(back) else 0)
@@ -82,13 +85,24 @@ def diagnose(
     return Diagnosis("timing", "slow" if speed < 1 else "fast")
 
 
-def _is_at_rest(recent: Sequence[FloatArray], noise_stds: FloatArray) -> bool:
-    latest = np.stack(recent)
+def _is_held(means: FloatArray, recent: Sequence[FloatArray], tick: int, extents: FloatArray, n_rest: int) -> bool:
+    """Whether it has not moved for some ticks, while it should have.
+
+    Parameters
+    ----------
+    extents : (D,) array, root mean square by which what is at rest still seems to move.
+    """
+    latest = np.stack(recent[-n_rest:])
     latest = latest[~np.isnan(latest).any(axis=1)]
     if len(latest) < REST_TICKS[0]:
         return False
-    extents = np.sqrt(np.mean((latest - latest.mean(axis=0)) ** 2, axis=0))
-    return bool(np.all(extents < REST_EXTENT + 1.5 * noise_stds))
+    place = latest.mean(axis=0)
+    if np.any(np.sqrt(np.mean((latest - place) ** 2, axis=0)) > extents):
+        return False
+    moved = [j for j, there in enumerate(reversed(recent)) if np.any(np.abs(there - place) > 3 * extents)]
+    since = moved[0] if moved else len(recent)
+    due = means[min(tick, TICKS)] - means[min(max(tick - since, 0), TICKS)]
+    return bool(np.any(np.abs(due) > np.maximum(5 * extents, LEAST_DUE)))
 
 
 class _Explanations(NamedTuple):

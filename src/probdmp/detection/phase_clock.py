@@ -59,6 +59,9 @@ class PhaseClock:
             self._pending.append(Tick(self._next, np.full(len(values), np.nan)))
             self._next += 1
         seen = ~np.isnan(values)
+        if not self._pending and seen.all():  # between ticks: nothing to do but to remember
+            self._last_times, self._last_values = np.full(len(values), now), values
+            return []
         if self._pending and seen.any():
             self._fill(now, values, seen)
         self._last_times = np.where(seen, now, self._last_times)

@@ -49,7 +49,10 @@ class SensorWatch:
             max(LEAST_REPEATS, LEAST_REPEAT_SHARE * duration / dt),
         )
         self._most_silent = max(SILENCE_SHARE * duration / dt, 2.0)
-        self._believed = np.full((2, n_dof), np.nan)
+        unknown = np.full(n_dof, np.nan)
+        self._believed = (unknown, unknown)
+        """The last sample but one, and the last."""
+        self._is_calm = False
         self._suspicious = np.full(n_dof, np.nan)
         self._last = np.full(n_dof, np.nan)
         self._silent, self._skipped = np.zeros(n_dof), np.zeros(n_dof)
@@ -74,12 +77,20 @@ class SensorWatch:
 
     def believe(self, measured: FloatArray) -> FloatArray:
         """The sample (D,) without what is suspicious of it, which is NaN instead; data units."""
+        older, old = self._believed
+        jumps = np.abs(measured - old - (self._skipped + 1) * (old - older))
+        if self._is_calm and np.all(jumps <= self._largest_jumps) and not np.any(measured == self._last):
+            self._believed, self._last = (old, measured), measured
+            return measured
+        return self._look(measured, jumps)
+
+    def _look(self, measured: FloatArray, jumps: FloatArray) -> FloatArray:
+        """The same where something may be missing, wild or repeated."""
+        older, old = self._believed
         seen = ~np.isnan(measured)
         self._silent = np.where(seen, 0, self._silent + 1)
         self.repeats = np.where(seen, np.where(measured == self._last, self.repeats + 1, 0), self.repeats)
         self._last = np.where(seen, measured, self._last)
-        older, old = self._believed
-        jumps = np.abs(measured - old - (self._skipped + 1) * (old - older))
         wild = seen & (jumps > self._largest_jumps)
         confirmed = wild & (np.abs(measured - self._suspicious) <= self._largest_jumps)
         self.spikes = self.spikes + (seen & ~wild & ~np.isnan(self._suspicious))
@@ -87,8 +98,10 @@ class SensorWatch:
         believed = np.where(seen & ~(wild & ~confirmed), measured, np.nan)
         self._skipped = np.where(seen & np.isnan(believed), self._skipped + 1, 0)
         # After a jump, or a gap, there is no line to compare with.
-        gap = confirmed | ~seen
-        self._believed = np.where(
-            np.isnan(believed), np.where(gap, np.nan, self._believed), np.stack([np.where(gap, np.nan, old), believed])
+        gap, unknown = confirmed | ~seen, np.isnan(believed)
+        self._believed = (
+            np.where(gap, np.nan, np.where(unknown, older, old)),
+            np.where(unknown, np.where(gap, np.nan, old), believed),
         )
+        self._is_calm = bool(seen.all() and not self.repeats.any() and np.isnan(self._suspicious).all())
         return believed

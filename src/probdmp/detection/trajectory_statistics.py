@@ -23,6 +23,7 @@ __all__ = [
     "AHEAD",
     "BEFORE",
     "CHANNELS",
+    "FLOORS",
     "HORIZONS",
     "LAST_STANDSTILL",
     "MEMORY",
@@ -37,6 +38,8 @@ __all__ = [
 HORIZONS = (3, 6, 10, 16)
 """L: ticks after which a forecast is looked at."""
 CHANNELS = ("position", "displacement", *(f"standstill_{horizon}" for horizon in HORIZONS))
+FLOORS = np.array([0.0, 0.0, *(1.0 for _ in HORIZONS)])
+"""Values up to which a channel is not suspicious: a standstill has to be likelier than its contrary."""
 
 LAGS = np.array([3, 6, 9, 12, 15])
 DISPLACEMENT_SHIFTS = np.arange(-6, 7, 2)

@@ -145,11 +145,9 @@ def task_for(
     start_velocity : (D,) array, data units per second; uncertain likewise where it is NaN, or not given.
     """
     shape, hint = (primitive.n_dof,), f"One number for each of {', '.join(primitive.names)}."
-    # Forcing terms that are redrawn at every step know no spread of the goal; joint parameters have one, unless it is told.
-    learned_goal = np.full(shape, np.nan) if primitive.configuration.weight_uncertainty == "joint" else primitive.goal
     return Task(
         check_array(primitive.start if start is None else start, "start", shape, missing=True, hint=hint),
-        learned_goal if goal is None else check_array(goal, "goal", shape, hint=hint),
+        np.full(shape, np.nan) if goal is None else check_array(goal, "goal", shape, hint=hint),
         np.asarray(primitive.duration if duration is None else check_seconds(duration, "duration")),
         None if start_velocity is None else check_array(start_velocity, "start_velocity", shape, missing=True, hint=hint),
     )
