@@ -15,7 +15,7 @@ from probdmp.detection.path_model import path_model
 from probdmp.detection.profile import ExecutionProfile
 from probdmp.detection.trajectory_model import TrajectoryModel
 from probdmp.detection.trajectory_source import Expectation, TrajectorySource
-from probdmp.detection.trajectory_statistics import CHANNELS, FLOORS
+from probdmp.detection.trajectory_statistics import CHANNELS, FLOORS, HANDICAPS
 from probdmp.dmp import Primitive, Task, Variation
 from probdmp.dmp.phase import phases_at
 from probdmp.errors import InputError
@@ -39,7 +39,7 @@ class TrajectoryFamily:
     profiles : by identity of the primitive.
     """
 
-    channels, floors = CHANNELS, FLOORS
+    channels, floors, handicaps = CHANNELS, FLOORS, HANDICAPS
 
     def __init__(self, primitives: Mapping[str, Primitive], profiles: Mapping[str, ExecutionProfile]) -> None:
         self.profiles = profiles

@@ -24,6 +24,7 @@ __all__ = [
     "BEFORE",
     "CHANNELS",
     "FLOORS",
+    "HANDICAPS",
     "HORIZONS",
     "LAST_STANDSTILL",
     "MEMORY",
@@ -35,11 +36,14 @@ __all__ = [
     "sloppiness",
 ]
 
-HORIZONS = (3, 6, 10, 16)
+HORIZONS = (6, 10, 16)
 """L: ticks after which a forecast is looked at."""
 CHANNELS = ("position", "displacement", *(f"standstill_{horizon}" for horizon in HORIZONS))
 FLOORS = np.array([0.0, 0.0, *(1.0 for _ in HORIZONS)])
 """Values up to which a channel is not suspicious: a standstill has to be likelier than its contrary."""
+HANDICAPS = np.array([2.0, 0.0, *(2.0 for _ in HORIZONS)])
+"""Nats of surprise by which a channel stands back behind displacement. What the others are for, a movement that ends elsewhere or
+stands still, becomes plain sooner or later; a push passes, and the false alarms that may be had are better spent on it."""
 
 LAGS = np.array([3, 6, 9, 12, 15])
 DISPLACEMENT_SHIFTS = np.arange(-6, 7, 2)
