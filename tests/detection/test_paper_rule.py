@@ -1,4 +1,4 @@
-"""The detector: the same verdict online and over recordings, in any units, and only for what it was fitted to."""
+"""The paper's rule: the same verdict online and over recordings, in any units, and only for what it was fitted to."""
 
 import json
 from dataclasses import replace
@@ -39,7 +39,7 @@ def library(learned, letters):
 
 @pytest.fixture(scope="module", params=LIKELIHOODS)
 def detector(request, learned, letters):
-    return FailureDetector(likelihood=request.param).fit(learned, letters["s"][:4])
+    return FailureDetector(rule="paper", likelihood=request.param).fit(learned, letters["s"][:4])
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +68,7 @@ def same(one, other, rtol=1e-9):
 def test_training_demonstrations_are_fine(detector, letters):
     """The worst of them has fallen half as far as is allowed, or not at all if the minimum is positive."""
     np.testing.assert_array_equal(detector.predict(letters["s"][:4]), [1, 1, 1, 1])
-    (threshold,) = detector.thresholds_.values()
+    (threshold,) = detector.rule_.thresholds.values()
     worst = max(v.test_ratio for v in detector.verdicts(letters["s"][:4]))
     assert worst == pytest.approx(0.5 if threshold.minimum < 0 else 0.0, rel=1e-9)
 
@@ -79,7 +79,7 @@ def test_the_threshold_is_the_least_statistic_of_the_training_demonstrations(det
         tracked = learned.track(d, duration=learned.primitive_.duration)
         steps = (tracked.contributions + np.log(learned.primitive_.ranges)).sum(axis=1)
         values.append(steps if detector.likelihood == "per_step" else np.cumsum(steps))
-    (threshold,) = detector.thresholds_.values()
+    (threshold,) = detector.rule_.thresholds.values()
     assert threshold.minimum == pytest.approx(min(v.min() for v in values), rel=1e-9)
 
 
@@ -107,7 +107,7 @@ def test_without_tasks_a_detector_knows_what_execute_knows(detector, learned, le
         return [task_for(primitive, d.positions[0], **known) for d in recordings]
 
     training = letters["s"][:4]
-    again = FailureDetector(likelihood=detector.likelihood).fit(learned, training, tasks=told(training))
+    again = FailureDetector(rule="paper", likelihood=detector.likelihood).fit(learned, training, tasks=told(training))
     assert again.state() == detector.state()
     for one, other in zip(detector.verdicts(executions), again.verdicts(executions, tasks=told(executions)), strict=True):
         same(one, other)
@@ -117,7 +117,7 @@ def test_without_tasks_a_detector_knows_what_execute_knows(detector, learned, le
 
 def test_blocked_executions_are_not_all_fine(learned, letters, executions):
     """Else nothing here has been tested."""
-    detector = FailureDetector().fit(learned, letters["s"][:4])
+    detector = FailureDetector(rule="paper").fit(learned, letters["s"][:4])
     assert {v.failed for v in detector.verdicts(executions)} == {True, False}
 
 
@@ -135,7 +135,7 @@ def test_units_change_no_alarm(detector, letters, executions, unit):
         return [replace(d, positions=d.positions * unit) for d in demos]
 
     other = ProbabilisticDMP(10).fit(scaled(letters["s"][:4]))
-    judge = FailureDetector(likelihood=detector.likelihood).fit(other, scaled(letters["s"][:4]))
+    judge = FailureDetector(rule="paper", likelihood=detector.likelihood).fit(other, scaled(letters["s"][:4]))
     for one, two in zip(detector.verdicts(executions), judge.verdicts(scaled(executions)), strict=True):
         same(one, two, rtol=1e-3)
 
@@ -145,7 +145,7 @@ def test_permuted_degrees_of_freedom_change_no_alarm(detector, letters, executio
         return [replace(d, positions=d.positions[:, ::-1], names=("y", "x")) for d in demos]
 
     other = ProbabilisticDMP(10).fit(permuted(letters["s"][:4]))
-    judge = FailureDetector(likelihood=detector.likelihood).fit(other, permuted(letters["s"][:4]))
+    judge = FailureDetector(rule="paper", likelihood=detector.likelihood).fit(other, permuted(letters["s"][:4]))
     for one, two in zip(detector.verdicts(executions), judge.verdicts(permuted(executions)), strict=True):
         same(replace(one, contributions=one.contributions[::-1], names=("y", "x")), two, rtol=1e-6)
 
@@ -160,6 +160,13 @@ def test_a_movement_at_another_time_is_judged_alike(detector, executions, learne
             online.step(o, epoch + k * 0.02)
         verdicts.append(online.verdict)
     same(*verdicts)
+
+
+def test_the_level_is_twice_the_minimum(detector, learned, library):
+    (threshold,) = detector.rule_.thresholds.values()
+    assert detector.paper_level(learned.primitive_) == threshold.level
+    with pytest.raises(InputError, match='a detector with rule="paper" that was fitted to this primitive'):
+        detector.paper_level(library["a"].primitive_)
 
 
 # --- missing data -----------------------------------------------------------------------------------------------------
@@ -179,7 +186,7 @@ def test_without_any_data_there_is_no_alarm(detector, learned, letters):
 @settings(max_examples=20)
 @given(seeds, st.floats(0, 1))
 def test_a_tick_without_data_is_never_the_one_that_alarms(learned, letters, seed, fraction):
-    detector = FailureDetector().fit(learned, letters["s"][:4])
+    detector = FailureDetector(rule="paper").fit(learned, letters["s"][:4])
     positions, missing = np.array(letters["s"][5].positions), np.random.default_rng(seed).random(len(letters["s"][5].positions))
     positions[missing < fraction] = np.nan
     positions[40:] += 3
@@ -200,7 +207,7 @@ def test_a_sensor_that_is_lost_is_no_alarm_by_itself(likelihood, lost):
     primitive = make_primitive(rng, observation_variances=np.array([1.0, 1e-6]), forcing_precisions=np.array([1e-2, 10.0]))
     task = task_for(primitive)
     draws = sample_trajectories(primitive, task, 0.02, 40, rng, True)
-    detector = FailureDetector(likelihood=likelihood)
+    detector = FailureDetector(rule="paper", likelihood=likelihood)
     detector.fit(primitive, draws[:20], 0.02, [task] * 20)
     np.testing.assert_array_equal(detector.predict(draws[:20], 0.02, [task] * 20), 1)
     for draw in draws[:20]:
@@ -211,7 +218,7 @@ def test_a_sensor_that_is_lost_is_no_alarm_by_itself(likelihood, lost):
 @pytest.mark.parametrize("likelihood", LIKELIHOODS)
 def test_few_dropouts_in_training_demonstrations_are_hardly_an_alarm(likelihood, learned, letters):
     """After a gap it has strayed further than in training: with 5 % of the samples lost, 1.8 % of the recordings alarm."""
-    detector = FailureDetector(likelihood=likelihood).fit(learned, letters["s"][:4])
+    detector = FailureDetector(rule="paper", likelihood=likelihood).fit(learned, letters["s"][:4])
     rng, failed = np.random.default_rng(0), []
     for _ in range(100):
         gaps = [np.array(d.positions) for d in letters["s"][:4]]
@@ -229,7 +236,7 @@ def ticks(values):
     """What a monitor is shown, of one degree of freedom whose standardised log-likelihoods are given."""
     for t, value in enumerate(values):
         seen = np.array([np.nan if value is None else 0.0])
-        yield Observed(t, t * 0.1, 0.9**t, np.array([0.0 if value is None else value]), seen, np.ones(1))
+        yield Observed(t, t * 0.1, 0.9**t, seen, np.array([0.0 if value is None else value]), seen, np.ones(1))
 
 
 def monitored(values, minimum=-1.0):
@@ -259,7 +266,7 @@ def test_exactly_at_the_threshold_is_no_alarm():
 def test_a_verdict_in_words():
     contributions, names = np.array([-1.0, -7.0]), ("x", "y")
     assert str(Verdict(True, 5, 0.25, 0.5, 2.345, contributions, names)) == (
-        "failed at 0.250 s (phase 0.50): test ratio 2.35, mostly y"
+        "failed at 0.250 s (phase 0.50): test ratio 2.35, mostly −y"
     )
     assert str(Verdict(False, 5, 0.25, 0.5, 0.123, contributions, names)).startswith("fine: largest test ratio 0.12")
 
@@ -272,7 +279,7 @@ def test_before_the_first_tick_nothing_is_known(detector, learned):
 
 
 def test_reset_clears_the_alarm(learned, letters):
-    detector = FailureDetector().fit(learned, letters["s"][:4])
+    detector = FailureDetector(rule="paper").fit(learned, letters["s"][:4])
     online = learned.execute(detector=detector)
     for _ in range(5):
         online.step([1e4, 1e4])
@@ -283,7 +290,7 @@ def test_reset_clears_the_alarm(learned, letters):
 
 def test_a_monitor_serves_one_execution(learned, letters):
     """Two executions with one detector do not hear of each other."""
-    detector = FailureDetector(likelihood="cumulative").fit(learned, letters["s"][:4])
+    detector = FailureDetector(rule="paper", likelihood="cumulative").fit(learned, letters["s"][:4])
     one, other = learned.execute(detector=detector), learned.execute(detector=detector)
     one.step([1e4, 1e4])
     assert one.failed
@@ -308,11 +315,11 @@ def test_replay_shows_what_an_online_execution_shows(learned, letters):
 
 
 def test_a_library_is_judged_by_label(library, letters):
-    together = FailureDetector().fit(library, letters)
+    together = FailureDetector(rule="paper").fit(library, letters)
     mixed = [letters["s"][4], letters["a"][4], letters["s"][5], letters["a"][5]]
     verdicts = together.verdicts(mixed)
     for letter in "sa":
-        alone = FailureDetector().fit(library[letter], letters[letter])
+        alone = FailureDetector(rule="paper").fit(library[letter], letters[letter])
         own = [v for v, d in zip(verdicts, mixed, strict=True) if d.label == letter]
         for one, other in zip(own, alone.verdicts([d for d in mixed if d.label == letter]), strict=True):
             same(one, other)
@@ -321,7 +328,7 @@ def test_a_library_is_judged_by_label(library, letters):
 
 
 def test_tasks_go_with_their_executions(library, letters):
-    detector = FailureDetector().fit(library, letters)
+    detector = FailureDetector(rule="paper").fit(library, letters)
     mixed = [letters["s"][4], letters["a"][4], letters["s"][5]]
     tasks = [task_for(library[d.label].primitive_, d.positions[0], d.positions[-1], d.duration) for d in mixed]
     backwards = detector.verdicts(mixed[::-1], tasks=tasks[::-1])[::-1]
@@ -330,7 +337,7 @@ def test_tasks_go_with_their_executions(library, letters):
 
 
 def test_a_label_that_is_not_in_the_library(library, letters):
-    detector = FailureDetector().fit(library, letters)
+    detector = FailureDetector(rule="paper").fit(library, letters)
     with pytest.raises(InputError, match=r"executions labelled as one of \['a', 's'\], got 'z'"):
         detector.verdicts([replace(letters["s"][0], label="z")])
     with pytest.raises(InputError, match=r"executions labelled as one of \['a', 's'\], got ''"):
@@ -341,18 +348,19 @@ def test_a_label_that_is_not_in_the_library(library, letters):
 def test_a_library_needs_demonstrations_by_label(library, letters, given_demos):
     demos = letters["s"] if given_demos == "list" else {"s": letters["s"]}
     with pytest.raises(InputError, match=r"demonstrations by label for each of \['a', 's'\], got"):
-        FailureDetector().fit(library, demos)
+        FailureDetector(rule="paper").fit(library, demos)
 
 
 # --- what it was fitted to --------------------------------------------------------------------------------------------
 
 
 def test_unfitted(learned, letters):
-    detector = FailureDetector()
+    detector = FailureDetector(rule="paper")
     for use in (
         lambda: detector.predict(letters["s"]),
         lambda: detector.verdicts(letters["s"]),
-        lambda: detector.monitor(learned.primitive_),
+        lambda: detector.monitor(learned.primitive_, task_for(learned.primitive_), 0.02),
+        lambda: detector.paper_level(learned.primitive_),
         lambda: learned.execute(detector=detector),
         detector.state,
     ):
@@ -362,11 +370,11 @@ def test_unfitted(learned, letters):
 
 def test_a_primitive_that_was_not_learned(letters):
     with pytest.raises(NotFittedError, match=r"a learned primitive.*Call fit"):
-        FailureDetector().fit(ProbabilisticDMP(), letters["s"])
+        FailureDetector(rule="paper").fit(ProbabilisticDMP(), letters["s"])
 
 
 def test_a_foreign_primitive(learned, letters):
-    detector = FailureDetector().fit(learned, letters["s"][:4])
+    detector = FailureDetector(rule="paper").fit(learned, letters["s"][:4])
     again = ProbabilisticDMP(10).fit(letters["s"][:5])
     with pytest.raises(InputError, match=r"a primitive that this detector was fitted to, got another one\. Learned anew\?"):
         again.execute(detector=detector)
@@ -375,7 +383,7 @@ def test_a_foreign_primitive(learned, letters):
 
 
 def test_a_fit_that_fails_leaves_the_detector_as_it_was(library, letters):
-    detector = FailureDetector().fit(library["s"], letters["s"])
+    detector = FailureDetector(rule="paper").fit(library["s"], letters["s"])
     before = detector.verdicts(letters["s"])
     with pytest.raises(InputError, match="recordings of 2 degrees of freedom"):
         detector.fit(library["a"], [np.zeros((20, 3))])
@@ -385,7 +393,7 @@ def test_a_fit_that_fails_leaves_the_detector_as_it_was(library, letters):
 
 @pytest.mark.parametrize("argument", ["rule", "likelihood"])
 def test_choices_are_checked_when_fitting(learned, letters, argument):
-    detector = FailureDetector(**{argument: "guess"})
+    detector = FailureDetector(**{"rule": "paper", argument: "guess"})
     with pytest.raises(InputError, match=f"{argument} to be one of .*, got 'guess'"):
         detector.fit(learned, letters["s"])
 
@@ -419,14 +427,14 @@ def test_state_is_plain_and_restores_the_same_detector(detector, learned, execut
 @pytest.mark.parametrize(
     ("damage", "match"),
     [
-        ({"rule": "none"}, "rule to be one of 'paper', got 'none'"),
+        ({"rule": "none"}, "rule to be one of 'calibrated', 'paper', got 'none'"),
         ({"rule": None}, "rule to be one of"),
         ({"rule": ["paper"]}, "rule to be one of"),
         ({"likelihood": 3}, "likelihood to be one of"),
         ({"minima": None}, "a detector with"),
         ({"minima": 3}, "a detector with"),
-        ({"minima": {}}, "a detector with"),
-        ({"minima": {"": 1.0}}, "a detector with"),
+        ({"minima": {}}, "a minimum for each primitive"),
+        ({"minima": {"": 1.0}}, "a minimum for each primitive"),
         ({"surplus": 1}, "a detector with"),
     ],
     ids=repr,
@@ -451,8 +459,10 @@ def test_minima_without_their_values_are_refused(detector, learned):
 
 
 def test_an_empty_state_is_refused(learned):
-    with pytest.raises(InputError, match="a detector with rule, likelihood and a minimum for each primitive"):
+    with pytest.raises(InputError, match="rule to be one of 'calibrated', 'paper', got None"):
         FailureDetector.from_state({}, {"": learned.primitive_})
+    with pytest.raises(InputError, match="a detector with a likelihood and minima"):
+        FailureDetector.from_state({"rule": "paper"}, {"": learned.primitive_})
 
 
 def test_a_state_for_other_primitives_is_refused(detector, library):
@@ -464,4 +474,4 @@ def test_a_state_for_other_primitives_is_refused(detector, library):
 def test_demonstrations_that_were_never_measured_cannot_calibrate(learned):
     """No statistic, no threshold: an infinite one would never alarm and could not be saved."""
     with pytest.raises(InputError, match=r"Expected .*measured"):
-        FailureDetector().fit(learned, [Demonstration(np.full((20, 2), np.nan), 0.02)])
+        FailureDetector(rule="paper").fit(learned, [Demonstration(np.full((20, 2), np.nan), 0.02)])
