@@ -31,6 +31,7 @@ TAIL_PRIOR = 0.1
 STATISTIC_TAIL_SHARE = 0.2
 ENOUGH = 5.0
 """Calibration executions expected above a threshold that is one of them."""
+ROUNDING = 1e-9
 SUSPECT = 0.1
 """A primitive is flagged where chance alone would give it so many values above the threshold less often than this."""
 
@@ -101,9 +102,13 @@ class Calibration:
 
     def _threshold(self) -> tuple[float, bool]:
         alpha, ordered = self.false_alarm_rate, np.sort(self.statistics)
-        if alpha * (self.n + 1) >= ENOUGH:
-            return float(ordered[int(np.ceil((self.n + 1) * (1 - alpha))) - 1]), True
-        start = float(np.quantile(ordered, 1 - STATISTIC_TAIL_SHARE))
+        least = float(np.finfo(float).tiny)
+        if alpha * (self.n + 1) >= ENOUGH - ROUNDING:
+            above = int(alpha * (self.n + 1) + ROUNDING)  # of the n and the one to come; 0.059 * 1000 < 59
+            return max(float(ordered[self.n - above]), least), True
+        if self.n >= ENOUGH:
+            least = max(least, float(ordered[-int(ENOUGH)]))  # conformal at the least rate that has enough; no less for a smaller one
+        start = float(np.quantile(ordered, 1 - max(STATISTIC_TAIL_SHARE, alpha)))
         excesses = ordered[ordered > start] - start
         scale = (excesses.sum() + 1.0) / (len(excesses) + 1)  # were the channels one, T would be exponential with scale 1
-        return max(start + scale * float(np.log(STATISTIC_TAIL_SHARE / alpha)), np.finfo(float).tiny), False
+        return max(start + scale * max(float(np.log(STATISTIC_TAIL_SHARE / alpha)), 0.0), least), False
