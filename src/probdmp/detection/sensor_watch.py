@@ -1,7 +1,8 @@
 """Is the sensor to be believed? Exact repeats, single wild samples, silence.
 
 A sample that is far from the straight line through the two before it is set aside until the next one: if that is near it, the
-movement has jumped, and both count; if not, it was a spike. So a spike never reaches the statistics of the movement.
+movement has jumped, and counts from there on; if not, it was a spike. So a spike never reaches the statistics of the movement, and
+a movement that runs away soon does.
 """
 
 import numpy as np
@@ -17,6 +18,8 @@ LEAST_JUMP = 0.05
 """And at least this fraction of the range."""
 SPIKES = 3
 """So many spikes in an execution make a sensor fault."""
+LONGEST_SPIKE = 3
+"""Samples; what is wild for longer is how the movement goes, whether or not they agree."""
 REPEAT_FACTOR = 2.0
 """A sensor is stuck from so many times the longest repetition of the demonstrations."""
 LEAST_REPEATS = 5
@@ -75,7 +78,8 @@ class SensorWatch:
         older, old = self._believed
         jumps = np.abs(measured - old - (self._skipped + 1) * (old - older))
         wild = seen & (jumps > self._largest_jumps)
-        confirmed = wild & (np.abs(measured - self._suspicious) <= self._largest_jumps)
+        agrees = np.abs(measured - self._suspicious) <= self._largest_jumps
+        confirmed = wild & (agrees | (self._skipped >= LONGEST_SPIKE))
         self.spikes = self.spikes + (seen & ~wild & ~np.isnan(self._suspicious))
         self._suspicious = np.where(wild & ~confirmed, measured, np.where(seen, np.nan, self._suspicious))
         believed = np.where(seen & ~(wild & ~confirmed), measured, np.nan)
