@@ -4,9 +4,9 @@ Executions that are told their goal and duration and executions that are not dif
 calibration for each. Unless tasks are given, both are made, from demonstrations that are told where they end, or not.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from os import cpu_count
 from typing import Any, Protocol, Self
 
@@ -126,25 +126,28 @@ class CalibratedRule:
             If the state is not one, or that of a detector for other primitives.
         """
         try:
+            _check_keys(state, ("options", "family", "calibrations"))
+            _check_keys(state["options"], [field.name for field in fields(DetectorOptions)])
             options = DetectorOptions(**state["options"])
             family: Family
+            identities = [primitive.identity for primitive in primitives.values()]
+            _check_keys(state["family"], identities if options.statistic == "trajectory" else ())
             if options.statistic == "trajectory":
                 family = TrajectoryFamily.from_state(state["family"], primitives)
             else:
                 family = InnovationFamily(options.statistic)
-            calibrations = {
-                knows_goal: {
-                    label: _restored(values, options, len(family.channels))
-                    for label, values in state["calibrations"][mode].items()
+            modes = {knows_goal: mode for knows_goal, mode in MODES.items() if mode in state["calibrations"]}
+            _check_keys(state["calibrations"], modes.values() or MODES.values())
+            calibrations = {}
+            for knows_goal, mode in modes.items():
+                by_label = state["calibrations"][mode]
+                _check_keys(by_label, (POOLED,) if options.pooled else primitives)
+                calibrations[knows_goal] = {
+                    label: _restored(values, options, len(family.channels), primitives if options.pooled else (label,))
+                    for label, values in by_label.items()
                 }
-                for knows_goal, mode in MODES.items()
-                if mode in state["calibrations"]
-            }
-            complete = all(set(c) == ({POOLED} if options.pooled else set(primitives)) for c in calibrations.values())
         except (KeyError, TypeError, AttributeError) as error:
             raise InputError("a calibrated detector for these primitives", f"{type(error).__name__}: {error}") from error
-        if not calibrations or not complete:
-            raise InputError("calibrations for these primitives", f"{sorted(state['calibrations'])}")
         return cls(options, family, primitives, calibrations)
 
     def _monitor(self, primitive: Primitive, task: Task, source: Source) -> CalibratedMonitor:
@@ -159,6 +162,8 @@ def _tasks(member: Member, knows_goal: bool) -> list[Task]:
         return list(member.tasks) if agree else []
     if not knows_goal:
         return own_tasks(member.primitive, member.recordings)
+    if any(np.isnan(recording.positions).all(axis=0).any() for recording in member.recordings):
+        raise InputError("recordings of which every degree of freedom was measured", "one of which one was not")
     return [task_of_recording(member.primitive, r, goal=_last_seen(r)) for r in member.recordings]
 
 
@@ -188,7 +193,18 @@ def _calibrate(
     return {POOLED: pooled}
 
 
-def _restored(values: Mapping[str, Any], options: DetectorOptions, n_channels: int) -> Calibration:
-    labels = [str(label) for label in values["labels"]]
+def _restored(
+    values: Mapping[str, Any], options: DetectorOptions, n_channels: int, expected: Collection[str]
+) -> Calibration:
+    """A calibration on executions of the expected primitives."""
+    _check_keys(values, ("maxima", "labels"))
+    labels = values["labels"]
+    if not isinstance(labels, list) or not all(isinstance(label, str) for label in labels) or set(labels) != set(expected):
+        raise InputError(f"labels of calibration executions, out of {sorted(expected)}", f"{labels!r:.200}")
     maxima = check_array(values["maxima"], "maxima", (len(labels), n_channels))
     return Calibration(maxima, labels, options.false_alarm_rate, options.calibration)
+
+
+def _check_keys(state: Mapping[str, Any], expected: Iterable[str]) -> None:
+    if set(state) != set(expected):
+        raise InputError(f"a calibrated detector with {', '.join(map(repr, expected)) or 'nothing more'}", f"{state!r:.200}")
