@@ -81,7 +81,8 @@ def executions(fresh):
     chosen = [d for k, d in enumerate(fresh) if k % 6 < 2]
     return {
         name: [
-            replace(d, positions=fault(d.positions, len(d.positions) // 2, np.random.default_rng(k))) for k, d in enumerate(chosen)
+            replace(d, positions=fault(d.positions, len(d.positions) // 2, np.random.default_rng(k)))
+            for k, d in enumerate(chosen)
         ]
         for name, fault in faults.items()
     }

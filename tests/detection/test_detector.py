@@ -30,7 +30,9 @@ def chosen(executions):
 
 def test_leaving_out_what_was_never_in_is_refused(varied, training, fresh):
     others = [d for d in fresh if d.label == "s"]
-    with pytest.raises(InputError, match=r'the demonstrations that taught the primitive, got 6 others\..*calibration="held_out"'):
+    with pytest.raises(
+        InputError, match=r'the demonstrations that taught the primitive, got 6 others\..*calibration="held_out"'
+    ):
         FailureDetector().fit(varied["s"], others)
     with pytest.raises(InputError, match=r"got 1 others of 'l'"):
         FailureDetector().fit(varied, {**training, "l": [*training["l"], replace(others[0], label="l")]})
@@ -67,7 +69,9 @@ def test_a_bare_primitive_is_taken_at_its_word(varied, training):
 @pytest.mark.parametrize("library", [True, False])
 def test_pooled_weights_cannot_say_how_executions_vary(pooled_weights, training, library):
     learned, demos = ({"l": pooled_weights}, training) if library else (pooled_weights, training["l"])
-    wanted = r'primitives that know how executions vary, got .*weight_model="hierarchical", or use rule="paper" or statistic="nis"'
+    wanted = (
+        r'primitives that know how executions vary, got .*weight_model="hierarchical", or use rule="paper" or statistic="nis"'
+    )
     with pytest.raises(InputError, match=wanted):
         FailureDetector().fit(learned, demos)
     FailureDetector(rule="paper").fit(learned, demos)
@@ -165,7 +169,9 @@ def test_a_fit_that_fails_leaves_the_detector_as_it_was(varied, training):
 # --- files ------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("arguments", [{}, {"pooled": False, "persistence": 2}, {"statistic": "nis"}, {"rule": "paper"}], ids=str)
+@pytest.mark.parametrize(
+    "arguments", [{}, {"pooled": False, "persistence": 2}, {"statistic": "nis"}, {"rule": "paper"}], ids=str
+)
 def test_a_file_brings_the_detector_back(tmp_path, varied, training, chosen, arguments):
     pair = {label: varied[label] for label in "sl"}
     library, chosen = PrimitiveLibrary(pair), [d for d in chosen if d.label in pair]
@@ -218,7 +224,25 @@ def damaged(state, path, change):
     return copy
 
 
-JUNK = (None, True, -1, 10**400, float("nan"), float("inf"), 1e300, "", "junk", [], [1, "x"], {}, {"junk": 1}, [None, 1], [[]], (), b"")
+JUNK = (
+    None,
+    True,
+    -1,
+    10**400,
+    float("nan"),
+    float("inf"),
+    1e300,
+    "",
+    "junk",
+    [],
+    [1, "x"],
+    {},
+    {"junk": 1},
+    [None, 1],
+    [[]],
+    (),
+    b"",
+)
 
 
 @pytest.fixture(scope="module")
@@ -238,7 +262,9 @@ def states(alone, calibrated, varied, pooled_weights, training):
 
 
 @settings(max_examples=300)
-@given(st.integers(0, 4), st.integers(0, 10**6), st.sampled_from(["missing", "extra", "junk"]), st.sampled_from(range(len(JUNK))))
+@given(
+    st.integers(0, 4), st.integers(0, 10**6), st.sampled_from(["missing", "extra", "junk"]), st.sampled_from(range(len(JUNK)))
+)
 def test_a_damaged_state_is_refused_or_of_use(states, which, piece, kind, junk):
     """Never an error of another kind, then or later; what is missing is always noticed, and what is too much."""
     state, primitives = states[which]

@@ -75,7 +75,9 @@ def test_the_order_of_demonstrations_does_not_matter(training, chosen, verdicts)
 
 
 def test_other_labels_and_units_written_down_do_not_matter(training, chosen, verdicts):
-    found = judged([replace(d, units="inch") for d in training["l"]], [replace(d, units="inch", label="") for d in chosen], True)
+    found = judged(
+        [replace(d, units="inch") for d in training["l"]], [replace(d, units="inch", label="") for d in chosen], True
+    )
     for one, other in zip(verdicts[True], found, strict=True):
         assert_same(one, other, 1e-9)
 
@@ -89,7 +91,8 @@ def test_twice_the_sampling_rate_hardly_changes_a_verdict(calibrated, varied, ex
         positions = np.stack([np.interp(at, np.arange(len(d.positions)), column) for column in d.positions.T], axis=1)
         finer.append(replace(d, positions=positions, dt=d.dt / 2))
     one, other = (
-        calibrated.verdicts(group, tasks=[task_of(varied[d.label].primitive_, d, True) for d in group]) for group in (fine, finer)
+        calibrated.verdicts(group, tasks=[task_of(varied[d.label].primitive_, d, True) for d in group])
+        for group in (fine, finer)
     )
     for slow, fast in zip(one, other, strict=True):
         assert slow.failed == fast.failed

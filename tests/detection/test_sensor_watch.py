@@ -134,7 +134,10 @@ def test_units_do_not_matter(seed, exponent):
     samples = movement(rng)
     samples[rng.integers(2, 99, 5)] += RANGES * rng.choice([-1, 1]) * 0.5
     scaled = SensorWatch(
-        ExecutionProfile(np.asarray(0.1), np.full(2, 1e-3) * unit, np.zeros(2), 0.002 * RANGES * unit), RANGES * unit, DURATION, DT
+        ExecutionProfile(np.asarray(0.1), np.full(2, 1e-3) * unit, np.zeros(2), 0.002 * RANGES * unit),
+        RANGES * unit,
+        DURATION,
+        DT,
     )
     np.testing.assert_array_equal(np.isnan(believed(scaled, samples * unit)), np.isnan(believed(watch(), samples)))
 

@@ -88,7 +88,10 @@ def test_contributions_add_up_to_the_squared_distance(seed):
     windows = PathWindows(model, offsets, shifts, TICKS + 1)
     window = random_paths(model, rng, 1, 120)[:, np.maximum(place + offsets, 0)]
     (share,) = windows.contributions(place, 1, window[0], model.means)
-    (square,), (last,) = windows.whiten(np.array([place]), window[:, None], model.means[None]).squares[0, 0, 1, 2:], window[0, -1]
+    (square,), (last,) = (
+        windows.whiten(np.array([place]), window[:, None], model.means[None]).squares[0, 0, 1, 2:],
+        window[0, -1],
+    )
     assert abs(share) == pytest.approx(square, rel=1e-9)
     assert np.sign(share) == np.sign(last - model.means[min(place, TICKS)].item())
 

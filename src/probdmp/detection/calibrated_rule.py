@@ -1,4 +1,4 @@
-"""Detection at a chosen rate of false alarms: any statistic, its threshold from executions that taught nothing to the primitive.
+"""Detection at a chosen rate of false alarms: any statistic, its threshold from executions that taught the primitive nothing.
 
 Executions that are told their goal and duration and executions that are not differ in what is normal, so there is a
 calibration for each. Unless tasks are given, both are made, from demonstrations that are told where they end, or not.
@@ -109,9 +109,7 @@ class CalibratedRule:
     def state(self) -> dict[str, Any]:
         """Plain values."""
         calibrations = {
-            MODES[knows_goal]: {
-                label: {"maxima": c.maxima.tolist(), "labels": list(c.labels)} for label, c in by_label.items()
-            }
+            MODES[knows_goal]: {label: {"maxima": c.maxima.tolist(), "labels": list(c.labels)} for label, c in by_label.items()}
             for knows_goal, by_label in self.calibrations.items()
         }
         return {"options": asdict(self.options), "family": self.family.state(), "calibrations": calibrations}
@@ -193,9 +191,7 @@ def _calibrate(
     return {POOLED: pooled}
 
 
-def _restored(
-    values: Mapping[str, Any], options: DetectorOptions, n_channels: int, expected: Collection[str]
-) -> Calibration:
+def _restored(values: Mapping[str, Any], options: DetectorOptions, n_channels: int, expected: Collection[str]) -> Calibration:
     """A calibration on executions of the expected primitives."""
     _check_keys(values, ("maxima", "labels"))
     labels = values["labels"]

@@ -91,7 +91,7 @@ class Calibration:
         return {label: alarms[label] / counts[label] for label in sorted(alarms) if chance[label] < SUSPECT}
 
     def surprise(self, values: FloatArray) -> FloatArray:
-        """-ln of the share of normal executions that ever reach values (…, C), channel by channel; no evidence is no surprise."""
+        """-ln of the share of normal executions that ever reach values (…, C), by channel; no evidence is no surprise."""
         filled = np.nan_to_num(np.asarray(values, dtype=np.float64))
         ranks = np.stack(
             [self.n - np.searchsorted(column, filled[..., c], "left") for c, column in enumerate(self._sorted.T)], axis=-1
@@ -107,7 +107,8 @@ class Calibration:
             above = int(alpha * (self.n + 1) + ROUNDING)  # of the n and the one to come; 0.059 * 1000 < 59
             return max(float(ordered[self.n - above]), least), True
         if self.n >= ENOUGH:
-            least = max(least, float(ordered[-int(ENOUGH)]))  # conformal at the least rate that has enough; no less for a smaller one
+            # Conformal at the least rate that has enough executions; no less for a smaller one.
+            least = max(least, float(ordered[-int(ENOUGH)]))
         start = float(np.quantile(ordered, 1 - max(STATISTIC_TAIL_SHARE, alpha)))
         excesses = ordered[ordered > start] - start
         scale = (excesses.sum() + 1.0) / (len(excesses) + 1)  # were the channels one, T would be exponential with scale 1

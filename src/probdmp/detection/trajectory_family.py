@@ -133,7 +133,9 @@ def values_of(trajectory: TrajectoryModel, ticks: Sequence[tuple[FloatArray, Flo
     if longest == 0:
         return [np.zeros((0, len(CHANNELS))) for _ in ticks]
     # What lies beyond the end of a path is never looked at.
-    paths = np.stack([np.pad(path, ((0, longest - len(path)), (0, 0)), mode="edge" if len(path) else "empty") for path, _ in ticks])
+    paths = np.stack(
+        [np.pad(path, ((0, longest - len(path)), (0, 0)), mode="edge" if len(path) else "empty") for path, _ in ticks]
+    )
     values = trajectory.values(paths, np.stack([goal for _, goal in ticks]))
     return [value[: len(path)] for value, (path, _) in zip(values, ticks, strict=True)]
 
