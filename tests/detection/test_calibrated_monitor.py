@@ -1,5 +1,7 @@
 """An alarm: when it comes, what of it stays, what may be refined, and what ends it."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from detection.verdicts import run_online, task_of
@@ -29,7 +31,7 @@ class Script:
     def contributions(self, channel):
         return np.array([self.t, -1.0])
 
-    def diagnose(self):
+    def diagnose(self, *context):
         return Diagnosis("motion", f"as of {self.t}")
 
     def better(self):
@@ -192,7 +194,7 @@ def test_persistence_on_a_real_execution(varied, training, executions):
     for persistence in (1, 3, 8):
         detector = FailureDetector(0.05, persistence=persistence).fit(varied["l"], training["l"])
         results.append(detector.verdicts(chosen))
-    for sooner, later in zip(results, results[1:], strict=False):
+    for sooner, later in pairwise(results):
         for one, other in zip(sooner, later, strict=True):
             assert one.failed or not other.failed
             if other.failed:

@@ -131,11 +131,10 @@ def test_pooled_or_each_by_itself(calibrated, alone, varied, training, fresh):
 
 
 def test_who_is_not_told_the_goal_is_judged_as_such(calibrated, varied, executions):
-    """With independent weights too, for which an execution that is told no goal has the learned one."""
+    """With independent weights too."""
     fine = executions["fine"]
     untold = [task_for(varied[d.label].primitive_, d.positions[0]) for d in fine]
     for task, d in zip(untold, fine, strict=True):
-        np.testing.assert_array_equal(task.goal, varied[d.label].primitive_.goal)
         calibration = calibrated.rule_.calibration(varied[d.label].primitive_, task)
         assert calibration is calibrated.rule_.calibrations[False][""]
     assert not any(v.failed for v in calibrated.verdicts(fine, tasks=untold))

@@ -101,8 +101,8 @@ def test_a_smaller_rate_has_a_larger_threshold(seed, n):
 
 @pytest.mark.parametrize(("n", "rate"), [(99, 0.05), (99, 0.1), (199, 0.05), (199, 0.2)])
 def test_fresh_executions_raise_alarms_at_the_rate_that_was_asked_for(n, rate):
-    """Conformal: the alarms among m fresh executions are beta-binomial. Ranks of the calibration executions depend on themselves,
-    which costs a few of them."""
+    """Conformal: the alarms among m fresh executions are beta-binomial. Ranks of the calibration executions
+    depend on themselves, which costs a few of them."""
     rng, m, runs = np.random.default_rng(0), 200, 60
     alarms = []
     for _ in range(runs):

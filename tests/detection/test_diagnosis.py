@@ -48,7 +48,7 @@ def paced(recording, onset, speed):
 
 
 def reasons(detector, library, originals, recordings):
-    """Verdicts a little after the alarms of executions that were told to go as the originals did: what comes later may look otherwise."""
+    """Verdicts a little after the alarms of executions that were told to go as the originals: later it may look otherwise."""
     tasks = [task_of(library[d.label].primitive_, d, True) for d in originals]
     ends = [
         v.step + round(0.14 * len(d.positions))

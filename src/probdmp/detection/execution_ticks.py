@@ -22,8 +22,8 @@ class ExecutionTicks:
         self._ranges, self._start = primitive.ranges, np.full(primitive.n_dof, np.nan)
         self._task, self._has_begun = task, False
         self.goal = np.full(primitive.n_dof, np.nan)
-        """(D,) array: displacement of the goal as a fraction of the range; NaN where it is not told, or the start was not seen by
-        the first tick."""
+        """(D,) array: displacement of the goal as a fraction of the range; NaN where it is not told, or the start was not seen
+        by the first tick."""
 
     def advance(self, time: float, measured: FloatArray) -> list[Tick]:
         """Take in a sample (D,), data units; returns the ticks that are complete."""

@@ -1,8 +1,8 @@
 """Is the sensor to be believed? Exact repeats, single wild samples, silence.
 
 A sample that is far from the straight line through the two before it is set aside until the next one: if that is near it, the
-movement has jumped, and counts from there on; if not, it was a spike. So a spike never reaches the statistics of the movement, and
-a movement that runs away soon does.
+movement has jumped, and counts from there on; if not, it was a spike. So a spike never reaches the statistics of the
+movement, and a movement that runs away soon does.
 """
 
 import numpy as np
