@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from strategies import seeds
 
 from probdmp.detection.profile import ExecutionProfile, repeats
-from probdmp.detection.sensor_watch import LEAST_JUMP, SPIKES, SensorWatch
+from probdmp.detection.sensor_watch import LEAST_JUMP, LEAST_REPEAT_SHARE, LEAST_REPEATS, SPIKES, SensorWatch
 
 DURATION, DT = 1.0, 0.01
 RANGES = np.array([2.0, 0.5])
@@ -84,18 +84,25 @@ def test_some_spikes_make_a_sensor_fault():
     assert sensors.shares.max() >= 1
 
 
-@pytest.mark.parametrize(("shown", "most"), [(0.0, 5), (0.05, 10)])
-def test_exact_repeats_make_a_stuck_sensor(shown, most):
-    """More than five, than 4 % of the duration, and than twice what the demonstrations showed."""
-    sensors, samples = watch(longest_repeats=shown), movement(np.random.default_rng(0))
-    for k in range(most + 1):
-        sensors.believe(np.array([samples[k, 0], 0.1]))
-        assert sensors.cause == ""
-        assert sensors.shares[1] <= 1
-    sensors.believe(np.array([samples[20, 0], 0.1]))
-    assert sensors.cause == "stuck"
-    assert sensors.shares[1] > 1
-    assert sensors.shares[0] == 0
+def repeats_until_stuck(sensors, samples):
+    """How often the second sensor may say the same until it is not believed any more."""
+    for k, sample in enumerate(samples):
+        sensors.believe(np.array([sample[0], 0.1]))
+        assert (sensors.cause == "stuck") == (sensors.shares[1] > 1)
+        assert sensors.shares[0] == 0
+        if sensors.cause:
+            return k
+    return len(samples)
+
+
+def test_exact_repeats_make_a_stuck_sensor():
+    """More than a few, and for more than some part of the duration; more where the demonstrations have shown some."""
+    samples = movement(np.random.default_rng(0))
+    least = max(LEAST_REPEATS, LEAST_REPEAT_SHARE * DURATION / DT)
+    assert repeats_until_stuck(watch(), samples) == int(least + 1e-9) + 1
+    found = [repeats_until_stuck(watch(longest_repeats=shown), samples) for shown in (0.0, 0.03, 0.06, 0.1)]
+    assert found == sorted(found)
+    assert found[-1] > 10
 
 
 def test_what_is_not_measured_repeats_nothing():
@@ -103,7 +110,8 @@ def test_what_is_not_measured_repeats_nothing():
     for k in range(60):
         sensors.believe(np.array([0.1 if k % 2 else np.nan, np.sin(k / 30)]))
         if k == 9:
-            assert sensors.cause == ""  # five values, four repeats
+            assert sensors.repeats[0] == 4  # five values
+            assert sensors.cause == ""
     assert sensors.cause == "stuck"
 
 
