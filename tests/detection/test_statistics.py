@@ -17,7 +17,8 @@ def observed(contributions, seen=True):
     """One tick of degrees of freedom with range one."""
     contributions, seen = np.asarray(contributions, dtype=np.float64), np.broadcast_to(seen, len(contributions))
     variances = np.full(len(contributions), VARIANCE)
-    return Observed(0, 0.0, 1.0, np.where(seen, contributions, 0.0), np.where(seen, 0.0, np.nan), variances)
+    innovations = np.where(seen, 0.0, np.nan)
+    return Observed(0, 0.0, 1.0, innovations, np.where(seen, contributions, 0.0), innovations, variances)
 
 
 @given(seeds, st.floats(-6, 6), st.booleans())

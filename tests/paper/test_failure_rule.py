@@ -44,7 +44,7 @@ def test_the_minimum_of_the_training_demonstrations_is_stored(learned, letters, 
     primitive, training = learned.primitive_, letters["a"][:10]
     detector = fitted(primitive, training, likelihood)
     by_hand = min(statistic_by_hand(primitive, recording, likelihood).min() for recording in training)
-    (threshold,) = detector.thresholds_.values()
+    (threshold,) = detector.rule_.thresholds.values()
     assert threshold.minimum == pytest.approx(by_hand, rel=1e-9)
 
 
@@ -54,7 +54,7 @@ def test_unless_told_the_tasks_a_detector_knows_what_an_execution_knows(learned,
     primitive, training = learned.primitive_, letters["a"][:10]
     detector = FailureDetector(rule="paper", likelihood=likelihood).fit(primitive, training)
     by_hand = min(statistic_by_hand(primitive, r, likelihood, primitive.goal, primitive.duration).min() for r in training)
-    (threshold,) = detector.thresholds_.values()
+    (threshold,) = detector.rule_.thresholds.values()
     assert threshold.minimum == pytest.approx(by_hand, rel=1e-9)
     d = letters["a"][11]
     held = replace(d, positions=FAULTS["hold"](d.positions, len(d.positions) // 2, np.random.default_rng(1)))
@@ -72,7 +72,7 @@ def test_failed_if_at_any_point_below_twice_the_minimum(learned, letters, likeli
     """We classify an execution as failed if at any point the loglikelihood drops below 2 times the minimum reported value."""
     primitive, training = learned.primitive_, letters["a"][:10]
     detector = fitted(primitive, training, likelihood)
-    (threshold,) = detector.thresholds_.values()
+    (threshold,) = detector.rule_.thresholds.values()
     rng, executions = np.random.default_rng(0), list(letters["a"][10:])
     executions += [replace(d, positions=FAULTS["hold"](d.positions, len(d.positions) // 2, rng)) for d in letters["a"][10:]]
     tasks = own_tasks(primitive, executions)
@@ -152,7 +152,7 @@ def test_the_rule_does_not_depend_on_units(letters, unit):
         primitive, _ = fit_primitive(training, Configuration(), LearningOptions())
         detector = fitted(primitive, training, "per_step")
         verdicts = detector.verdicts(executions, tasks=own_tasks(primitive, executions))
-        (threshold,) = detector.thresholds_.values()
+        (threshold,) = detector.rule_.thresholds.values()
         outcomes.append((threshold.minimum, [(v.failed, v.step) for v in verdicts], [v.test_ratio for v in verdicts]))
     (minimum, steps, ratios), (scaled_minimum, scaled_steps, scaled_ratios) = outcomes
     assert scaled_minimum == pytest.approx(minimum, rel=1e-3, abs=1e-3)

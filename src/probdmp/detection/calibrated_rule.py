@@ -1,12 +1,12 @@
-"""Detection at a chosen rate of false alarms: any statistic, its threshold from executions that taught nothing to the primitive.
+"""Detection at a chosen rate of false alarms: any statistic, its threshold from executions that taught the primitive nothing.
 
 Executions that are told their goal and duration and executions that are not differ in what is normal, so there is a
 calibration for each. Unless tasks are given, both are made, from demonstrations that are told where they end, or not.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from os import cpu_count
 from typing import Any, Protocol, Self
 
@@ -40,6 +40,8 @@ class Family(Protocol):
     def channels(self) -> tuple[str, ...]: ...
     @property
     def floors(self) -> FloatArray: ...
+    @property
+    def handicaps(self) -> FloatArray: ...
     def source(self, primitive: Primitive, task: Task, dt: float) -> Source: ...
     def replay(
         self, primitive: Primitive, tasks: Sequence[Task], recordings: Sequence[Demonstration]
@@ -87,9 +89,9 @@ class CalibratedRule:
 
     def calibration(self, primitive: Primitive, task: Task) -> Calibration:
         """What is normal for an execution."""
-        by_label = self.calibrations.get(tells_goal(task))
+        by_label = self.calibrations.get(tells_goal(primitive, task))
         if by_label is None:
-            told, other = ("tell", "do not") if tells_goal(task) else ("do not tell", "do")
+            told, other = ("tell", "do not") if tells_goal(primitive, task) else ("do not tell", "do")
             raise InputError(
                 f"a detector calibrated on executions that {told} their goal",
                 f"one calibrated on executions that {other}",
@@ -111,9 +113,7 @@ class CalibratedRule:
     def state(self) -> dict[str, Any]:
         """Plain values."""
         calibrations = {
-            MODES[knows_goal]: {
-                label: {"maxima": c.maxima.tolist(), "labels": list(c.labels)} for label, c in by_label.items()
-            }
+            MODES[knows_goal]: {label: {"maxima": c.maxima.tolist(), "labels": list(c.labels)} for label, c in by_label.items()}
             for knows_goal, by_label in self.calibrations.items()
         }
         return {"options": asdict(self.options), "family": self.family.state(), "calibrations": calibrations}
@@ -128,25 +128,28 @@ class CalibratedRule:
             If the state is not one, or that of a detector for other primitives.
         """
         try:
+            _check_keys(state, ("options", "family", "calibrations"))
+            _check_keys(state["options"], [field.name for field in fields(DetectorOptions)])
             options = DetectorOptions(**state["options"])
             family: Family
+            identities = [primitive.identity for primitive in primitives.values()]
+            _check_keys(state["family"], identities if options.statistic == "trajectory" else ())
             if options.statistic == "trajectory":
                 family = TrajectoryFamily.from_state(state["family"], primitives)
             else:
                 family = InnovationFamily(options.statistic)
-            calibrations = {
-                knows_goal: {
-                    label: _restored(values, options, family)
-                    for label, values in state["calibrations"][mode].items()
+            modes = {knows_goal: mode for knows_goal, mode in MODES.items() if mode in state["calibrations"]}
+            _check_keys(state["calibrations"], modes.values() or MODES.values())
+            calibrations = {}
+            for knows_goal, mode in modes.items():
+                by_label = state["calibrations"][mode]
+                _check_keys(by_label, (POOLED,) if options.pooled else primitives)
+                calibrations[knows_goal] = {
+                    label: _restored(values, options, family, primitives if options.pooled else (label,))
+                    for label, values in by_label.items()
                 }
-                for knows_goal, mode in MODES.items()
-                if mode in state["calibrations"]
-            }
-            complete = all(set(c) == ({POOLED} if options.pooled else set(primitives)) for c in calibrations.values())
         except (KeyError, TypeError, AttributeError) as error:
             raise InputError("a calibrated detector for these primitives", f"{type(error).__name__}: {error}") from error
-        if not calibrations or not complete:
-            raise InputError("calibrations for these primitives", f"{sorted(state['calibrations'])}")
         return cls(options, family, primitives, calibrations)
 
     def _monitor(self, primitive: Primitive, task: Task, source: Source) -> CalibratedMonitor:
@@ -157,14 +160,13 @@ class CalibratedRule:
 def _tasks(member: Member, knows_goal: bool) -> list[Task]:
     """Tasks of the recordings if they tell, or do not tell, the goal; none otherwise."""
     if member.tasks is not None:
-        return [task for task in member.tasks if tells_goal(task) == knows_goal] if _agree(member.tasks, knows_goal) else []
+        agree = all(tells_goal(member.primitive, task) == knows_goal for task in member.tasks)
+        return list(member.tasks) if agree else []
     if not knows_goal:
         return own_tasks(member.primitive, member.recordings)
+    if any(np.isnan(recording.positions).all(axis=0).any() for recording in member.recordings):
+        raise InputError("recordings of which every degree of freedom was measured", "one of which one was not")
     return [task_of_recording(member.primitive, r, goal=_last_seen(r)) for r in member.recordings]
-
-
-def _agree(tasks: Sequence[Task], knows_goal: bool) -> bool:
-    return all(tells_goal(task) == knows_goal for task in tasks)
 
 
 def _last_seen(recording: Demonstration) -> FloatArray:
@@ -186,14 +188,28 @@ def _calibrate(
         found = list(pool.map(lambda label: judge(library.members[label], tasks[label]), labels))
     maxima = dict(zip(labels, found, strict=True))
     of_each = {label: [label] * len(values) for label, values in maxima.items()}
-    rate, method = options.false_alarm_rate, options.calibration
     if not options.pooled:
-        return {label: Calibration(maxima[label], of_each[label], rate, method, family.floors) for label in labels}
-    names = [name for label in labels for name in of_each[label]]
-    return {POOLED: Calibration(np.concatenate(found), names, rate, method, family.floors)}
+        return {label: _calibration(maxima[label], of_each[label], options, family) for label in labels}
+    return {POOLED: _calibration(np.concatenate(found), [name for label in labels for name in of_each[label]], options, family)}
 
 
-def _restored(values: Mapping[str, Any], options: DetectorOptions, family: Family) -> Calibration:
-    labels = [str(label) for label in values["labels"]]
+def _calibration(maxima: FloatArray, labels: Sequence[str], options: DetectorOptions, family: Family) -> Calibration:
+    rate, method = options.false_alarm_rate, options.calibration
+    return Calibration(maxima, labels, rate, method, family.floors, family.handicaps)
+
+
+def _restored(
+    values: Mapping[str, Any], options: DetectorOptions, family: Family, expected: Collection[str]
+) -> Calibration:
+    """A calibration on executions of the expected primitives."""
+    _check_keys(values, ("maxima", "labels"))
+    labels = values["labels"]
+    if not isinstance(labels, list) or not all(isinstance(label, str) for label in labels) or set(labels) != set(expected):
+        raise InputError(f"labels of calibration executions, out of {sorted(expected)}", f"{labels!r:.200}")
     maxima = check_array(values["maxima"], "maxima", (len(labels), len(family.channels)))
-    return Calibration(maxima, labels, options.false_alarm_rate, options.calibration, family.floors)
+    return _calibration(maxima, labels, options, family)
+
+
+def _check_keys(state: Mapping[str, Any], expected: Iterable[str]) -> None:
+    if set(state) != set(expected):
+        raise InputError(f"a calibrated detector with {', '.join(map(repr, expected)) or 'nothing more'}", f"{state!r:.200}")

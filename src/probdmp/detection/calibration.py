@@ -3,7 +3,7 @@
     of each calibration execution i and channel c the largest value x_ic over its whole length
     surprise of a value a in channel c   L_c(a) = -ln (share of executions that ever reach a),
                                          by rank up to the 90 % quantile u, beyond it by a Pareto tail: ln(a / u) / z more
-    statistic                            T[t] = max_c L_c(a_c[t])
+    statistic                            T[t] = max_c (L_c(a_c[t]) - handicap_c)
     threshold                            h with a share alpha of executions whose largest T_i exceeds it
 
 alpha counts executions, not ticks. With alpha (n + 1) >= 5 the threshold is an order statistic of the n values T_i
@@ -33,8 +33,11 @@ TAIL_PRIOR = 0.1
 STATISTIC_TAIL_SHARE = 0.2
 ENOUGH = 5.0
 """Calibration executions expected above a threshold that is one of them."""
+ROUNDING = 1e-9
+SUSPICIOUS_SHARE = 0.1
+"""The most surprising executions of all; those of one primitive should not be many among them."""
 SUSPECT = 0.1
-"""A primitive is flagged where chance alone would give it so many values above the threshold less often than this."""
+"""A primitive is flagged where chance alone would give it so many of them less often than this."""
 
 
 class Calibration:
@@ -47,10 +50,17 @@ class Calibration:
     false_alarm_rate : alpha, of executions, in (0, 1).
     method : a name from `CALIBRATIONS`: where the executions come from.
     floors : (C,) array: up to these values nothing is suspicious.
+    handicaps : (C,) array, nats: how far each channel stands back behind the others.
     """
 
     def __init__(
-        self, maxima: FloatArray, labels: Sequence[str], false_alarm_rate: float, method: str, floors: FloatArray | float = 0.0
+        self,
+        maxima: FloatArray,
+        labels: Sequence[str],
+        false_alarm_rate: float,
+        method: str,
+        floors: FloatArray | float = 0.0,
+        handicaps: FloatArray | float = 0.0,
     ) -> None:
         self.maxima, self.labels = np.nan_to_num(maxima), tuple(labels)
         self.false_alarm_rate, self.method = false_alarm_rate, method
@@ -58,6 +68,7 @@ class Calibration:
             raise InputError("at least two calibration executions, each with a label", f"{len(self.maxima)}")
         self._sorted = np.sort(self.maxima, axis=0)
         self._ranked = self._sorted.T.tolist()
+        self._handicaps = np.broadcast_to(handicaps, self.maxima.shape[1:])
         least = np.maximum(floors, np.finfo(float).tiny)
         self._starts = np.maximum(np.quantile(self.maxima, 1 - TAIL_SHARE, axis=0), least)
         beyond = self.maxima > self._starts
@@ -88,27 +99,30 @@ class Calibration:
 
     @cached_property
     def suspects(self) -> dict[str, float]:
-        """Primitives that raise more alarms than they should: label to the share of their calibration executions."""
+        """Primitives that may raise more alarms than the others: label to the share of its executions in the common tail."""
         from scipy.stats import binom
 
-        alarms = Counter(label for label, t in zip(self.labels, self.statistics, strict=True) if t > self.threshold)
+        share = max(self.false_alarm_rate, SUSPICIOUS_SHARE)
+        level = np.quantile(self.statistics, 1 - share)
+        alarms = Counter(label for label, t in zip(self.labels, self.statistics, strict=True) if t > level)
         counts = Counter(self.labels)
-        chance = {label: binom.sf(k - 1, counts[label], self.false_alarm_rate) for label, k in alarms.items()}
+        chance = {label: binom.sf(k - 1, counts[label], share) for label, k in alarms.items()}
         return {label: alarms[label] / counts[label] for label in sorted(alarms) if chance[label] < SUSPECT}
 
     def surprise(self, values: FloatArray) -> FloatArray:
-        """-ln of the share of normal executions that ever reach values (…, C), channel by channel; no evidence is no surprise."""
+        """-ln of the share of normal executions that ever reach values (…, C), by channel, less its handicap; at least 0."""
         filled = np.nan_to_num(np.asarray(values, dtype=np.float64))
         ranks = np.stack(
             [self.n - np.searchsorted(column, filled[..., c], "left") for c, column in enumerate(self._sorted.T)], axis=-1
         )
         by_rank = np.minimum(-np.log((ranks + 1) / (self.n + 1)), self._tail_surprises)
         tail = np.log(np.maximum(filled, self._starts) / self._starts) / self._exponents
-        return np.where(filled > self._starts, self._tail_surprises + tail, by_rank)
+        return np.maximum(np.where(filled > self._starts, self._tail_surprises + tail, by_rank) - self._handicaps, 0.0)
 
     def surprises_now(self, values: FloatArray) -> list[float]:
         """The same for the values (C,) of one moment, fast enough for a control loop."""
-        return [self._surprise_of(channel, float(value)) for channel, value in enumerate(values)]
+        surprises = [self._surprise_of(channel, float(value)) for channel, value in enumerate(values)]
+        return [max(surprise - float(h), 0.0) for surprise, h in zip(surprises, self._handicaps, strict=True)]
 
     def _surprise_of(self, channel: int, value: float) -> float:
         start = self._starts[channel]
@@ -119,9 +133,14 @@ class Calibration:
 
     def _threshold(self) -> tuple[float, bool]:
         alpha, ordered = self.false_alarm_rate, np.sort(self.statistics)
-        if alpha * (self.n + 1) >= ENOUGH:
-            return float(ordered[int(np.ceil((self.n + 1) * (1 - alpha))) - 1]), True
-        start = float(np.quantile(ordered, 1 - STATISTIC_TAIL_SHARE))
+        least = float(np.finfo(float).tiny)
+        if alpha * (self.n + 1) >= ENOUGH - ROUNDING:
+            above = int(alpha * (self.n + 1) + ROUNDING)  # of the n and the one to come; 0.059 * 1000 < 59
+            return max(float(ordered[self.n - above]), least), True
+        if self.n >= ENOUGH:
+            # Conformal at the least rate that has enough executions; no less for a smaller one.
+            least = max(least, float(ordered[-int(ENOUGH)]))
+        start = float(np.quantile(ordered, 1 - max(STATISTIC_TAIL_SHARE, alpha)))
         excesses = ordered[ordered > start] - start
         scale = (excesses.sum() + 1.0) / (len(excesses) + 1)  # were the channels one, T would be exponential with scale 1
-        return max(start + scale * float(np.log(STATISTIC_TAIL_SHARE / alpha)), np.finfo(float).tiny), False
+        return max(start + scale * max(float(np.log(STATISTIC_TAIL_SHARE / alpha)), 0.0), least), False

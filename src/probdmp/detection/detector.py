@@ -80,13 +80,15 @@ class FailureDetector:
         """
         check_choice(self.rule, "rule", RULES)
         library = Library.of(learned, demonstrations, dt, tasks)
-        self.primitives_ = {label: member.primitive for label, member in library.members.items()}
-        self.rule_: CalibratedRule | PaperRule
+        rule: CalibratedRule | PaperRule
         if self.rule == "paper":
-            self.rule_ = PaperRule.fit(self.likelihood, library)
+            rule = PaperRule.fit(self.likelihood, library)
         else:
-            library.check_taught(self.calibration == "leave_one_out")
-            self.rule_ = CalibratedRule.fit(self._options(), library)
+            options = self._options()
+            library.check_taught(options.calibration == "leave_one_out")
+            rule = CalibratedRule.fit(options, library)
+        # Together, and only now: a fit that fails leaves the detector as it was.
+        self.rule_, self.primitives_ = rule, {label: member.primitive for label, member in library.members.items()}
         return self
 
     def monitor(self, primitive: Primitive, task: Task, dt: float) -> CalibratedMonitor | LikelihoodMonitor:
@@ -130,6 +132,13 @@ class FailureDetector:
     ) -> NDArray[np.int64]:
         """(N,) array: +1 for a fine execution, -1 for a failed one; arguments as in `verdicts`."""
         return np.array([-1 if verdict.failed else 1 for verdict in self.verdicts(executions, dt, tasks)], dtype=np.int64)
+
+    def paper_level(self, primitive: Primitive) -> float:
+        """The log-likelihood, nats, below which the paper's rule calls an execution of a primitive failed."""
+        rule = self._fitted()
+        if not isinstance(rule, PaperRule) or primitive.identity not in rule.thresholds:
+            raise InputError('a detector with rule="paper" that was fitted to this primitive', repr(self.rule))
+        return rule.thresholds[primitive.identity].level
 
     def state(self) -> dict[str, Any]:
         """What a model file keeps, as plain values."""

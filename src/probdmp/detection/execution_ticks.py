@@ -20,19 +20,20 @@ class ExecutionTicks:
         self.sensors = SensorWatch(profile, primitive.ranges, duration, dt)
         self._clock = PhaseClock(primitive.n_dof, duration, dt)
         self._ranges, self._start = primitive.ranges, np.full(primitive.n_dof, np.nan)
-        self._goal = task.goal
+        self._task, self._has_begun = task, False
+        self.goal = np.full(primitive.n_dof, np.nan)
+        """(D,) array: displacement of the goal as a fraction of the range; NaN where it is not told, or the start was not seen
+        by the first tick."""
 
     def advance(self, time: float, measured: FloatArray) -> list[Tick]:
         """Take in a sample (D,), data units; returns the ticks that are complete."""
         believed = self.sensors.believe(measured)
         # Displacements count from where the execution was first seen, not from where it was told to be.
         self._start = np.where(np.isnan(self._start), believed, self._start)
-        return self._clock.advance(time, (believed - self._start) / self._ranges)
-
-    @property
-    def goal(self) -> FloatArray:
-        """(D,) array: displacement of the goal as a fraction of the range; NaN where it is not told or the start not seen."""
-        return np.asarray((self._goal - self._start) / self._ranges)
+        ticks = self._clock.advance(time, (believed - self._start) / self._ranges)
+        if ticks and not self._has_begun:
+            self._has_begun, self.goal = True, (self._task.goal - self._start) / self._ranges
+        return ticks
 
 
 def ticks_of_recording(

@@ -27,7 +27,8 @@ class InnovationFamily:
     """
 
     def __init__(self, statistic: str) -> None:
-        self.statistic, self.channels, self.floors = statistic, (statistic,), np.zeros(1)
+        self.statistic, self.channels = statistic, (statistic,)
+        self.floors = self.handicaps = np.zeros(1)
 
     def source(self, primitive: Primitive, task: Task, dt: float) -> InnovationSource:
         """For one execution."""

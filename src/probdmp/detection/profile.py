@@ -8,6 +8,7 @@ import numpy as np
 
 from probdmp.checks import FloatArray, check_array, freeze_arrays
 from probdmp.demonstrations import Demonstration, noise_stds
+from probdmp.errors import InputError
 
 __all__ = ["ExecutionProfile", "repeats"]
 
@@ -52,6 +53,8 @@ class ExecutionProfile:
     def from_state(cls, state: Mapping[str, Any], n_dof: int) -> Self:
         """The profile again."""
         shapes = {"tempo_std": (), "noise_stds": (n_dof,), "longest_repeats": (n_dof,), "largest_jumps": (n_dof,)}
+        if set(state) != set(shapes):
+            raise InputError(f"a profile with {', '.join(shapes)}", f"{state!r:.200}")
         return cls(**{name: check_array(state[name], name, shape) for name, shape in shapes.items()})
 
 

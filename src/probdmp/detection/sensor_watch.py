@@ -1,7 +1,8 @@
 """Is the sensor to be believed? Exact repeats, single wild samples, silence.
 
 A sample that is far from the straight line through the two before it is set aside until the next one: if that is near it, the
-movement has jumped, and both count; if not, it was a spike. So a spike never reaches the statistics of the movement.
+movement has jumped, and counts from there on; if not, it was a spike. So a spike never reaches the statistics of the
+movement, and a movement that runs away soon does.
 """
 
 import numpy as np
@@ -25,6 +26,8 @@ COARSE_REPEATS = 2
 COARSE_FACTOR = 3.0
 COARSE_SHARE = 0.15
 """Such a sensor is stuck from so many times the longest of these repetitions and this fraction of the duration."""
+LONGEST_SPIKE = 3
+"""Samples; what is wild for longer is how the movement goes, whether or not they agree."""
 SILENCE_SHARE = 0.1
 """Nothing measured for this fraction of the duration: the execution can no longer be judged."""
 
@@ -92,7 +95,8 @@ class SensorWatch:
         self.repeats = np.where(seen, np.where(measured == self._last, self.repeats + 1, 0), self.repeats)
         self._last = np.where(seen, measured, self._last)
         wild = seen & (jumps > self._largest_jumps)
-        confirmed = wild & (np.abs(measured - self._suspicious) <= self._largest_jumps)
+        agrees = np.abs(measured - self._suspicious) <= self._largest_jumps
+        confirmed = wild & (agrees | (self._skipped >= LONGEST_SPIKE))
         self.spikes = self.spikes + (seen & ~wild & ~np.isnan(self._suspicious))
         self._suspicious = np.where(wild & ~confirmed, measured, np.where(seen, np.nan, self._suspicious))
         believed = np.where(seen & ~(wild & ~confirmed), measured, np.nan)

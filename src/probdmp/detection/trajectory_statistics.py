@@ -147,10 +147,15 @@ class Forecast:
         return self._at_rest(windows[:, :, len(BEFORE) - 1 :]) - going_on
 
     def _at_rest(self, since: FloatArray) -> FloatArray:
-        """Log-density of the points after the first, (n, T, 1 + points, D), if they are all where it is; (n, T, points)."""
+        """Log-density of the points after the first, (n, T, 1 + points, D), if they are all where it is; (n, T, points).
+
+        NaN from the first point on that was not seen; what came before it is judged as if the window ended there.
+        """
         moved = (since[:, :, 1:] - since[:, :, :1]) / self._rest_stds
         points, dof = moved.shape[2:]
         whitening = self._rest_whitening[:points, :points]
-        squares = np.cumsum(np.sum(np.matmul(whitening, moved) ** 2, axis=-1), axis=-1)
+        unseen = np.logical_or.accumulate(np.isnan(moved).any(axis=-1), axis=-1)
+        squares = np.cumsum(np.sum(np.matmul(whitening, np.nan_to_num(moved)) ** 2, axis=-1), axis=-1)
+        squares[unseen] = np.nan
         scales = np.cumsum(np.log(np.diagonal(whitening))) * dof - np.arange(1, points + 1) * np.log(self._rest_stds).sum()
         return np.asarray(scales - squares / 2 - np.arange(1, points + 1) * dof / 2 * log(2 * pi))

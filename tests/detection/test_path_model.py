@@ -1,0 +1,68 @@
+"""What is known about a path before it begins, against dense Gaussian conditioning."""
+
+import numpy as np
+import pytest
+
+from probdmp.detection.path_model import NOISE_FLOOR, path_model
+from probdmp.detection.phase_clock import TICKS
+from probdmp.detection.profile import ExecutionProfile
+from probdmp.dmp import path_distribution
+
+
+@pytest.fixture(scope="module")
+def primitive(varied):
+    return varied["s"].primitive_
+
+
+@pytest.fixture(scope="module")
+def profile(training):
+    return ExecutionProfile.of(training["s"])
+
+
+@pytest.fixture(scope="module")
+def dense(primitive):
+    """Mean (M D,) and covariance of displacements in ranges, before anything is told."""
+    path = path_distribution(primitive, TICKS + 1)
+    ranges = np.tile(primitive.ranges, TICKS + 1)
+    return path.means.ravel() / ranges, path.covariance.reshape(len(ranges), -1) / np.outer(ranges, ranges)
+
+
+@pytest.mark.parametrize("told", [[0.3, -0.8], [1.1, 0.2]])
+def test_a_told_goal_is_conditioned_on(primitive, profile, dense, told):
+    mean, covariance = dense
+    noise = np.diag((profile.noise_stds / primitive.ranges) ** 2 + NOISE_FLOOR**2)
+    end = slice(TICKS * 2, None)
+    gain = covariance[:, end] @ np.linalg.inv(covariance[end, end] + noise)
+    model = path_model(primitive, profile, knows_goal=True)
+    np.testing.assert_allclose(model.noise_variances, np.diag(noise), rtol=1e-12)
+    np.testing.assert_allclose(model.means_for(np.array([told]))[0].ravel(), mean + gain @ (told - mean[end]), atol=1e-9)
+    found = model.covariance.reshape(covariance.shape)
+    np.testing.assert_allclose(found, covariance - gain @ covariance[end], atol=1e-9)
+
+
+def test_a_goal_that_is_not_told_moves_nothing(primitive, profile, dense):
+    """In one degree of freedom: as if it were where it is expected."""
+    mean = dense[0].reshape(-1, 2)
+    model = path_model(primitive, profile, knows_goal=True)
+    partly, expected, untold = model.means_for(np.array([[0.4, np.nan], [0.4, mean[-1, 1]], [np.nan, np.nan]]))
+    np.testing.assert_allclose(partly, expected, atol=1e-12)
+    np.testing.assert_allclose(untold, mean, atol=1e-12)
+
+
+def test_without_a_goal_executions_may_be_slower_or_faster(primitive, profile, dense):
+    mean, covariance = dense
+    model = path_model(primitive, profile, knows_goal=False)
+    for goals in ([[0.4, -3.0]], [[np.nan, np.nan]]):
+        np.testing.assert_allclose(model.means_for(np.array(goals))[0].ravel(), mean, atol=1e-12)
+    phases = np.linspace(0, 1, TICKS + 1)
+    velocities = np.gradient(mean.reshape(-1, 2), phases, axis=0)
+    stretch = (float(profile.tempo_std) * phases[:, None] * velocities).ravel()
+    np.testing.assert_allclose(model.covariance.reshape(covariance.shape), covariance + np.outer(stretch, stretch), atol=1e-12)
+
+
+@pytest.mark.parametrize("knows_goal", [True, False])
+def test_covariances_are_those_of_something(primitive, profile, knows_goal):
+    covariance = path_model(primitive, profile, knows_goal).covariance.reshape((TICKS + 1) * 2, -1)
+    np.testing.assert_allclose(covariance, covariance.T, atol=1e-12)
+    assert np.linalg.eigvalsh(covariance).min() > -1e-9
+    np.testing.assert_allclose(covariance[:2], 0, atol=1e-12)  # displacements count from the start

@@ -1,0 +1,120 @@
+"""Ticks of the movement do not depend on how often it is sampled, come once, in order, and never from the future."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from strategies import seeds
+
+from probdmp.detection.phase_clock import LONGEST_GAP, TICKS, PhaseClock
+
+DURATION = 1.7
+
+
+def run(values, dt, duration=DURATION):
+    """All ticks of samples (T, D), and the sample at which each came."""
+    clock = PhaseClock(values.shape[1], duration, dt)
+    return [(tick, t) for t, row in enumerate(values) for tick in clock.advance(t * dt, row)]
+
+
+def numbers(ticks):
+    """(n, D) array."""
+    return np.stack([tick.values for tick, _ in ticks])
+
+
+def lossy(rng, n_samples, n_dof, missing):
+    values = np.cumsum(rng.standard_normal((n_samples, n_dof)), axis=0)
+    values[rng.random(values.shape) < missing] = np.nan
+    return values
+
+
+@given(seeds, st.sampled_from([1, 2, 5, 10]))
+def test_any_sampling_rate_of_a_piecewise_linear_path_gives_the_same_ticks(seed, finer):
+    """Corners every four ticks, each of them sampled at all rates."""
+    rng = np.random.default_rng(seed)
+    corners = rng.standard_normal((26, 2))
+    coarse = DURATION / 25
+    times = np.arange(25 * finer + 1) * coarse / finer
+    path = np.stack([np.interp(times, np.arange(26) * coarse, column) for column in corners.T], axis=1)
+    ticks = run(path, coarse / finer)
+    expected = np.stack([np.interp(np.arange(TICKS + 1) / 4, np.arange(26), column) for column in corners.T], axis=1)
+    np.testing.assert_allclose(numbers(ticks), expected[: len(ticks)], atol=1e-9)
+    assert len(ticks) == TICKS + 1
+
+
+@given(seeds, st.floats(0.003, 0.2), st.floats(0, 0.7))
+def test_every_tick_comes_once_and_in_order(seed, dt, missing):
+    ticks = run(lossy(np.random.default_rng(seed), 60, 2, missing), dt)
+    assert [tick.index for tick, _ in ticks] == list(range(len(ticks)))
+
+
+@given(seeds, st.floats(0.003, 0.2), st.floats(0, 0.7), st.integers(1, 59))
+def test_the_ticks_of_a_beginning_are_the_beginning_of_the_ticks(seed, dt, missing, length):
+    """Nothing is known before its time."""
+    values = lossy(np.random.default_rng(seed), 60, 2, missing)
+    whole, begun = run(values, dt), run(values[:length], dt)
+    np.testing.assert_array_equal([t for _, t in begun], [t for _, t in whole if t < length])
+    for (one, _), (other, _) in zip(begun, whole, strict=False):
+        np.testing.assert_array_equal(one.values, other.values)
+
+
+@given(seeds, st.floats(0.003, 0.05))
+def test_a_tick_waits_for_the_next_sample_and_no_longer(seed, dt):
+    ticks = run(lossy(np.random.default_rng(seed), 80, 1, 0.0), dt)
+    rate = TICKS / DURATION
+    for tick, t in ticks:
+        assert tick.index <= t * dt * rate + 1e-6
+        assert tick.index > (t - 1) * dt * rate + 1e-6 or tick.index == 0
+
+
+@pytest.mark.parametrize("dt", [DURATION / 1000, DURATION / 500, DURATION / 100])
+@pytest.mark.parametrize("gap", [2, 3, 4, 10])
+def test_short_gaps_are_bridged_and_long_ones_are_not(dt, gap):
+    """A gap of so many ticks between two samples, from tick 40 on."""
+    clock, ticks = PhaseClock(1, DURATION, dt), []
+    for t in range(round(DURATION / dt) + 1):
+        at = t * dt * TICKS / DURATION
+        missing = 40 + 1e-9 < at < 40 + gap - 1e-9
+        ticks += clock.advance(t * dt, np.array([np.nan if missing else 3 * at]))
+    inside = np.concatenate([tick.values for tick in ticks[41 : 40 + gap]])
+    if gap <= LONGEST_GAP:
+        np.testing.assert_allclose(inside, 3 * np.arange(41, 40 + gap), rtol=1e-9)
+    else:
+        assert np.isnan(inside).all()
+    outside = [tick for tick in ticks if not 40 < tick.index < 40 + gap]
+    np.testing.assert_allclose([tick.values[0] for tick in outside], [3 * tick.index for tick in outside], rtol=1e-9)
+
+
+def test_slow_sampling_is_no_gap():
+    """At five ticks between samples, one missing sample is bridged, two are not."""
+    values = np.arange(21.0)[:, None] * 5
+    values[6] = np.nan
+    values[10:12] = np.nan
+    found = numbers(run(values, DURATION / 20))[:, 0]
+    expected = np.arange(TICKS + 1.0)
+    expected[46:60] = np.nan
+    np.testing.assert_allclose(found, expected[: len(found)], atol=1e-9)
+
+
+@given(seeds, st.integers(0, 2))
+def test_degrees_of_freedom_do_not_hear_of_each_other(seed, lost):
+    """What one sensor misses changes no number of the others."""
+    rng = np.random.default_rng(seed)
+    values = lossy(rng, 80, 3, 0.2)
+    silent = np.array(values)
+    silent[:, lost] = np.nan
+    one, other = numbers(run(values, 0.02)), numbers(run(silent, 0.02))
+    others = [d for d in range(3) if d != lost]
+    n = min(len(one), len(other))
+    np.testing.assert_array_equal(one[:n, others], other[:n, others])
+
+
+def test_a_silent_sensor_holds_up_nothing_for_long():
+    values = np.column_stack([np.arange(200.0), np.full(200, np.nan)])
+    for tick, t in run(values, DURATION / 150):
+        assert t / 1.5 - tick.index <= LONGEST_GAP + 1
+
+
+def test_ticks_go_on_after_the_movement_should_be_over():
+    ticks = run(np.arange(300.0)[:, None], DURATION / 100)
+    np.testing.assert_allclose(numbers(ticks)[:, 0], np.arange(300), atol=1e-9)

@@ -1,0 +1,84 @@
+"""Recordings side by side and an execution tick by tick: the same values."""
+
+import numpy as np
+import pytest
+from detection.paths import random_path_model, random_paths, with_gaps
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from strategies import seeds
+
+from probdmp.detection.trajectory_family import values_of
+from probdmp.detection.trajectory_model import LARGEST_LOG_RATIO, TrajectoryModel, as_suspicion
+from probdmp.detection.trajectory_statistics import CHANNELS, HORIZONS, LAST_STANDSTILL, MEMORY
+
+
+@pytest.fixture(scope="module")
+def trajectories():
+    """Of one, two and three degrees of freedom."""
+    return [TrajectoryModel(random_path_model(np.random.default_rng(d), d)) for d in (1, 2, 3)]
+
+
+def followed(trajectory, path, goal):
+    follower = trajectory.follow(goal)
+    return np.stack([follower.update(row) for row in path]), follower
+
+
+@settings(max_examples=10)
+@given(seeds, st.sampled_from([0, 1, 2]), st.sampled_from([1, 5, 93, 130]), st.booleans(), st.booleans())
+def test_tick_by_tick_is_side_by_side(trajectories, seed, d, length, gaps, told):
+    trajectory, rng = trajectories[d], np.random.default_rng(seed)
+    paths = random_paths(trajectory.model, rng, 2, length)
+    if gaps:
+        paths = with_gaps(paths, rng)
+    goals = paths[:, -1] if told and not gaps else np.full((2, d + 1), np.nan)
+    together = trajectory.values(paths, goals)
+    for path, goal, values in zip(paths, goals, together, strict=True):
+        alone, _ = followed(trajectory, path, goal)
+        np.testing.assert_allclose(alone, values, rtol=1e-6, atol=1e-9)
+
+
+@settings(max_examples=15)
+@given(seeds, st.integers(1, 120), st.booleans())
+def test_values_never_look_ahead(trajectories, seed, length, gaps):
+    trajectory, rng = trajectories[1], np.random.default_rng(seed)
+    paths = random_paths(trajectory.model, rng, 1, 120)
+    if gaps:
+        paths = with_gaps(paths, rng)
+    goals = np.full((1, 2), np.nan)
+    whole = trajectory.values(paths, goals)
+    np.testing.assert_allclose(trajectory.values(paths[:, :length], goals), whole[:, :length], rtol=1e-6, atol=1e-9)
+
+
+def test_paths_of_different_lengths_do_not_hear_of_each_other(trajectories):
+    trajectory, rng = trajectories[1], np.random.default_rng(0)
+    paths = [with_gaps(random_paths(trajectory.model, rng, 1, n), rng)[0] for n in (30, 101, 130)]
+    ticks = [(path, np.full(2, np.nan)) for path in paths]
+    for value, tick in zip(values_of(trajectory, ticks), ticks, strict=True):
+        np.testing.assert_allclose(value, values_of(trajectory, [tick])[0], rtol=1e-6, atol=1e-9)
+
+
+def test_each_channel_speaks_when_it_can(trajectories):
+    """Where an execution is from the start on; a standstill from its horizon until the movement may be ending."""
+    trajectory = trajectories[1]
+    values = trajectory.values(random_paths(trajectory.model, np.random.default_rng(0), 1, 130), np.full((1, 2), np.nan))[0]
+    spoken = ~np.isnan(values)
+    assert spoken[:, :2].all()
+    for channel, horizon in enumerate(HORIZONS, start=2):
+        assert CHANNELS[channel] == f"standstill_{horizon}"
+        np.testing.assert_array_equal(np.flatnonzero(spoken[:, channel]), np.arange(horizon, LAST_STANDSTILL))
+
+
+def test_memory_is_bounded(trajectories):
+    trajectory = trajectories[1]
+    _, follower = followed(trajectory, random_paths(trajectory.model, np.random.default_rng(0), 1, 300)[0], np.zeros(2))
+    assert len(follower.recent) == MEMORY
+
+
+def test_suspicion_grows_with_evidence_and_stays_finite():
+    evidence = np.array([-np.inf, -1e9, -1.0, 0.0, 1.0, 1e9, np.inf])
+    suspicion = as_suspicion(evidence)
+    assert np.all(np.diff(suspicion) >= 0)
+    assert np.isfinite(suspicion).all()
+    assert suspicion[3] == 1
+    assert as_suspicion(np.array(LARGEST_LOG_RATIO)) == suspicion[-1]
+    assert np.isnan(as_suspicion(np.array(np.nan)))

@@ -1,0 +1,125 @@
+"""Each channel against its definition, computed densely."""
+
+import numpy as np
+import pytest
+from detection.paths import random_path_model, random_paths, standstill, window_model, with_gaps
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from strategies import seeds
+
+from probdmp.detection.phase_clock import TICKS
+from probdmp.detection.trajectory_statistics import (
+    AHEAD,
+    DISPLACEMENT_SHIFTS,
+    LAGS,
+    ORDINARY_SQUARE,
+    ORDINARY_TICKS,
+    SHIFT_STD,
+    SLOPPINESS_DELAY,
+    Displacement,
+    Forecast,
+    Position,
+    relative_to_sloppiness,
+)
+from probdmp.detection.windows import gather
+
+
+@settings(max_examples=10)
+@given(seeds, st.booleans())
+def test_the_forecast_is_the_log_ratio_of_rest_to_going_on(seed, gaps):
+    """Multivariate t, mixed over shifts of tempo, against a Gaussian at rest; what was not seen before is integrated out."""
+    rng = np.random.default_rng(seed)
+    model = random_path_model(rng, int(rng.integers(1, 3)))
+    paths = random_paths(model, rng, 1, 130)
+    places = np.array([0, 9, 50, 92])
+    if gaps:
+        before = with_gaps(paths, rng, 0.1)
+        for place in places:  # the place itself and what follows are seen
+            before[:, [place, *(place + AHEAD)]] = paths[:, [place, *(place + AHEAD)]]
+        paths = before
+    means = model.means_for(rng.standard_normal((1, model.means.shape[1])))
+    evidence = Forecast(model).judge(places, gather(paths, places, Forecast.offsets), means)
+    for t, place in enumerate(places):
+        for n_ahead in (1, 4, len(AHEAD)):
+            expected = standstill(model, paths[0], int(place), n_ahead, means[0])
+            assert evidence[0, t, n_ahead - 1] == pytest.approx(expected, rel=1e-6, abs=1e-6)
+
+
+def test_what_is_not_seen_is_no_evidence_but_what_came_before_it_still_is():
+    rng = np.random.default_rng(1)
+    model = random_path_model(rng, 2)
+    paths, place = random_paths(model, rng, 1, 100), np.array([40])
+    whole = Forecast(model).judge(place, gather(paths, place, Forecast.offsets), model.means[None])[0, 0]
+    paths[:, 40 + AHEAD[5], 0] = np.nan
+    lost = Forecast(model).judge(place, gather(paths, place, Forecast.offsets), model.means[None])[0, 0]
+    np.testing.assert_allclose(lost[:5], whole[:5], rtol=1e-9)
+    assert np.isnan(lost[5:]).all()
+
+
+def test_standing_still_is_evidence_for_rest_and_going_on_is_not():
+    rng = np.random.default_rng(2)
+    model = random_path_model(rng, 2)
+    going = random_paths(model, rng, 20, 100)
+    held = np.array(going)
+    held[:, 40:] = going[:, 40:41] + rng.standard_normal(held[:, 40:].shape) * np.sqrt(model.noise_variances)
+    place = np.array([40])
+    forecast, means = Forecast(model), np.repeat(model.means[None], 20, axis=0)
+    at_rest, gone_on = (forecast.judge(place, gather(p, place, Forecast.offsets), means)[:, 0, -1] for p in (held, going))
+    assert np.all(at_rest > gone_on)
+    assert np.mean(at_rest > 0) >= 0.9
+    assert np.mean(gone_on < 0) >= 0.9
+
+
+@settings(max_examples=10)
+@given(seeds)
+def test_position_is_the_squared_distance_from_the_mean(seed):
+    rng = np.random.default_rng(seed)
+    model = random_path_model(rng, 2)
+    path, ticks = random_paths(model, rng, 1, 130), np.arange(130)
+    found = Position(model).judge(ticks, gather(path, ticks, Position.offsets), model.means[None])[0]
+    for t in (0, 20, 100, 129):
+        mean, covariance = window_model(model, t, [0], 0, model.means)
+        e = path[0, t] - mean
+        assert found[t] == pytest.approx(e @ np.linalg.solve(covariance, e), rel=1e-7)
+
+
+@settings(max_examples=10)
+@given(seeds)
+def test_displacement_is_the_least_squared_distance_over_shifts(seed):
+    """Each shift has its price; beyond the end places are judged further on."""
+    rng = np.random.default_rng(seed)
+    model = random_path_model(rng, 2)
+    path, ticks = random_paths(model, rng, 1, 130), np.arange(130)
+    found = Displacement(model).judge(ticks, gather(path, ticks, Displacement.offsets), model.means[None])[0]
+    differences = np.hstack([-np.eye(len(LAGS)), np.ones((len(LAGS), 1))])
+    for t in (0, 10, 60, 100, 110):
+        squares = []
+        for shift in DISPLACEMENT_SHIFTS:
+            mean, covariance = window_model(model, t, Displacement.offsets, shift, model.means, differences)
+            e = (differences @ path[0, np.maximum(t + Displacement.offsets, 0)]).ravel() - mean
+            squares.append(e @ np.linalg.solve(covariance, e) + (shift / SHIFT_STD) ** 2)
+        assert found[t] == pytest.approx(min(squares) / 2, rel=1e-6)
+
+
+def test_nothing_seen_is_no_evidence():
+    model = random_path_model(np.random.default_rng(0), 2)
+    ticks, nothing = np.arange(5), np.full((1, 5, 2), np.nan)
+    for kind in (Position, Displacement):
+        assert np.isnan(kind(model).judge(ticks, gather(nothing, ticks, kind.offsets), model.means[None])).all()
+
+
+@given(seeds, st.floats(0, 0.5))
+def test_squares_are_relative_to_those_before_the_window(seed, missing):
+    rng = np.random.default_rng(seed)
+    squares = rng.chisquare(2, (2, 60))
+    squares[rng.random(squares.shape) < missing] = np.nan
+    found = relative_to_sloppiness(squares)
+    for n, t in np.ndindex(squares.shape):
+        before = squares[n, : max(t - SLOPPINESS_DELAY + 1, 0)]
+        before = before[~np.isnan(before)]
+        ordinary = (ORDINARY_TICKS * ORDINARY_SQUARE + before.sum()) / (ORDINARY_TICKS + len(before)) / ORDINARY_SQUARE
+        np.testing.assert_allclose(found[n, t], squares[n, t] / ordinary, rtol=1e-9)
+
+
+def test_the_lags_fit_into_the_movement():
+    assert LAGS.max() < TICKS
