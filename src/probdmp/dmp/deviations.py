@@ -1,7 +1,7 @@
 """What the parameters of an execution leave over is a movement too.
 
-The forcing term of an execution is f[t] = phi[t]^T w + eps[t]: its own weights, constant and unknown, and what
-N basis functions cannot say, white noise eps ~ N(0, 1 / beta). The system is linear, so eps adds a deviation to the path that theta gives,
+The forcing term of an execution is f[t] = phi[t]^T w + eps[t]: its own weights, constant and unknown, and what N basis
+functions cannot say, white noise eps ~ N(0, 1 / beta). The system is linear, so eps adds a deviation to the path of theta,
 
     p[t] = p0 + H[t] theta + d[t],    d[t] = A d[t-1] + B eps[t-1],   d[0] = 0
 
@@ -56,7 +56,7 @@ def deviation_system(primitive: Primitive, duration: FloatArray, dt: FloatArray)
 
 
 def lasting_variances(primitive: Primitive) -> FloatArray:
-    """Variance of the position of a deviation that has gone on for long, (D,) array, data units squared; about, for small steps.
+    """Variance of the position of a deviation that has gone on for long, about, (D,) array, data units squared.
 
     Of p'' = -alpha p' - alpha^2 / 4 p + noise of density S, in units of the duration, it is 2 S / alpha^3.
     """

@@ -72,8 +72,9 @@ def filter_joint(primitive: Primitive, executions: JointExecutions, observed: Fl
 def smooth_joint(primitive: Primitive, executions: JointExecutions, observed: FloatArray) -> GaussianSequence:
     """All states given all of the recordings, (T, N, D): (T, N, D, 3) and (T, N, D, 3, 3)."""
     updates, model = [], executions.model
-    for (model, _), _, update in _filtered(primitive, executions, observed):
+    for now, _, update in _filtered(primitive, executions, observed):
         updates.append(update)
+        model = now.model
     smoothed = smooth_deviations(updates, executions.system.transition)
     moments = [state_moments(model, d, rows) for d, rows in zip(smoothed, executions.rows, strict=True)]
     return GaussianSequence(*(np.stack(m) for m in zip(*moments, strict=True)))

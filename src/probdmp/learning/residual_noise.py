@@ -16,12 +16,13 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from probdmp.checks import FloatArray
 from probdmp.dmp import Primitive, Task
 from probdmp.dmp.deviations import DeviationSystem, deviation_system, lasting_variances
-from probdmp.dmp.joint_model import JointExecutions, joint_executions, position_designs
-from probdmp.dmp.transformation_system import VELOCITY
+from probdmp.dmp.joint_model import JointExecutions, joint_executions
+from probdmp.dmp.transformation_system import POSITION, VELOCITY
 
 __all__ = ["with_residual_noise"]
 
@@ -36,7 +37,7 @@ MOST_TIMES = 100
 
 class _Residuals(NamedTuple):
     errors: FloatArray
-    """r, (T, K, D) array, data units; NaN at the start, which is told, and after the end of a demonstration."""
+    """r, (T, D, K) array, data units; NaN at the start, which is told, and after the end of a demonstration."""
     spreads: FloatArray
     """(T, D, r) array, data units: a square root of the covariance H C H^T of one demonstration, of middle length."""
     typical: int
@@ -45,11 +46,11 @@ class _Residuals(NamedTuple):
 
 class _Gains(NamedTuple):
     velocity: FloatArray
-    """(T, G, D, K) array."""
+    """(T, G, D or 1, K) array."""
     position: FloatArray
-    """(T, G, D, K) array."""
+    """(T, G, D or 1, K) array."""
     variances: FloatArray
-    """S, (T, G, D, K) array."""
+    """S, (T, G, D or 1, K) array."""
 
 
 def with_residual_noise(primitive: Primitive, tasks: Task, dts: FloatArray, observed: FloatArray) -> Primitive:
@@ -65,39 +66,37 @@ def with_residual_noise(primitive: Primitive, tasks: Task, dts: FloatArray, obse
     residuals = _residuals(primitive, joint_executions(primitive, tasks, dts, len(observed)), observed)
     unit = replace(primitive, forcing_precisions=np.ones(primitive.n_dof))
     system, lasting = deviation_system(unit, tasks.duration, dts), lasting_variances(unit)
-    ratios = np.broadcast_to(RATIOS[:, None], (len(RATIOS), primitive.n_dof))
-    best = ratios[0]
-    for refined in (RATIOS, FINER):
-        ratios = refined[:, None] * (1.0 if refined is RATIOS else best)
-        likelihoods, scales = _likelihoods(residuals, system, ratios / lasting)
-        chosen = np.argmax(likelihoods, axis=0)[None]
-        best, variances = (np.take_along_axis(x, chosen, axis=0)[0] for x in (np.broadcast_to(ratios, scales.shape), scales))
+    best = np.ones(1)  # one for all degrees of freedom at first: they share the gains
+    for finer in (RATIOS, FINER):
+        ratios = finer[:, None] * best
+        likelihoods, scales = _likelihoods(residuals, system, ratios / lasting[: len(best)])
+        chosen = np.argmax(likelihoods, axis=0)
+        best = np.broadcast_to(ratios, scales.shape)[chosen, np.arange(primitive.n_dof)]
+    variances = scales[chosen, np.arange(primitive.n_dof)]
     variances = np.maximum(variances, LEAST_VARIANCE * primitive.ranges**2)
     return replace(primitive, observation_variances=variances, forcing_precisions=lasting / (best * variances))
 
 
 def _residuals(primitive: Primitive, executions: JointExecutions, observed: FloatArray) -> _Residuals:
     """What is left of the demonstrations by their parameters, which a part of their times tells."""
-    model, r = executions.model, executions.model.factors.shape[-1]
-    parts = [position_designs(model, rows) for rows in executions.rows]
-    offsets, designs = (np.stack(x) for x in zip(*parts, strict=True))
-    lengths = np.sum(~np.isnan(observed[..., 0]), axis=0)
-    typical = int(np.argsort(lengths)[len(lengths) // 2])
-    step = -(-len(observed) // MOST_TIMES)
-    weights = ~np.isnan(observed[::step]) / primitive.observation_variances
-    weights[0] = 0.0
-    errors = np.nan_to_num(observed - offsets)
+    model, rows = executions.model, np.moveaxis(executions.rows[..., POSITION, :], 0, 1)[:, None]
+    designs = rows @ model.factors  # (K, D, T, r)
+    errors = np.nan_to_num(np.moveaxis(observed, 0, -1) - (rows @ model.means[..., None])[..., 0])
+    seen = ~np.isnan(np.moveaxis(observed, 0, -1))
+    seen[..., 0] = False
+    (k, *_, r), step = designs.shape, -(-len(observed) // MOST_TIMES)
+    weights = (seen / primitive.observation_variances[:, None])[..., ::step].reshape(k, -1, 1)
+    some = designs[:, :, ::step].reshape(k, -1, r)
     mean, prior = model.belief
-    stacked = np.moveaxis(designs[::step], 1, 0).reshape(len(lengths), -1, r)
-    weighted = stacked * np.moveaxis(weights, 1, 0).reshape(len(lengths), -1, 1)
-    surprise = np.moveaxis(errors[::step], 1, 0).reshape(len(lengths), -1, 1) - stacked @ mean[..., None]
-    gain = np.linalg.solve(np.eye(r) + prior @ (stacked.mT @ weighted), prior)
-    means = mean + (gain @ (weighted.mT @ surprise))[..., 0]
-    residuals = np.where(np.isnan(observed), np.nan, errors - np.einsum("tkdr,kr->tkd", designs, means))
-    residuals[0] = np.nan
-    eigenvalues, vectors = np.linalg.eigh((gain[typical] + gain[typical].T) / 2)
-    spreads = designs[: lengths[typical], typical] @ (vectors * np.sqrt(np.maximum(eigenvalues, 0.0)))
-    return _Residuals(residuals, spreads, typical)
+    surprise = errors[..., ::step].reshape(k, -1, 1) - some @ mean[..., None]
+    covariances = np.linalg.solve(np.eye(r) + prior @ (some.mT @ (some * weights)), prior)
+    means = mean + (covariances @ (some.mT @ (weights * surprise)))[..., 0]
+    left = np.where(seen, errors - np.matmul(designs, means[:, None, :, None])[..., 0], np.nan)
+    lengths = observed.shape[0] - np.argmax(seen.any(axis=1)[:, ::-1], axis=-1)
+    typical = int(np.argsort(lengths)[k // 2])
+    eigenvalues, vectors = np.linalg.eigh((covariances[typical] + covariances[typical].T) / 2)
+    spreads = designs[typical, :, : lengths[typical]] @ (vectors * np.sqrt(np.maximum(eigenvalues, 0.0)))
+    return _Residuals(left.T, np.moveaxis(spreads, 0, 1), typical)
 
 
 def _likelihoods(residuals: _Residuals, system: DeviationSystem, variances: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -106,11 +105,11 @@ def _likelihoods(residuals: _Residuals, system: DeviationSystem, variances: Floa
     Parameters
     ----------
     system : of the K demonstrations, driven by unit noise.
-    variances : 1 / (beta R), (G, D) array.
+    variances : 1 / (beta R), (G, D or 1) array.
     """
     errors, spreads, typical = residuals
-    errors, counted = np.moveaxis(errors, 1, 2), ~np.isnan(np.moveaxis(errors, 1, 2))
-    gains = _gains(system, variances, len(errors))
+    counted = ~np.isnan(errors)
+    gains = _gains(system, variances, _gaps(counted))
     shared = _Gains(*(x[: len(spreads), ..., [typical]] for x in gains))
     moves = system.transition[:, 0, VELOCITY:, VELOCITY:]
     squares = _squared_innovations(np.where(counted, errors, 0.0), counted[:, None] / gains.variances, gains, moves)
@@ -118,25 +117,33 @@ def _likelihoods(residuals: _Residuals, system: DeviationSystem, variances: Floa
     n = counted[:, 0].sum()
     per_time = spread_squares.sum(axis=-1) / (len(spreads) - 1)
     scales = squares.sum(axis=-1) / n + per_time
-    logs = np.einsum("tdk,tgdk->gd", counted, np.log(gains.variances))
+    logs = np.sum(counted[:, None] * np.log(gains.variances), axis=(0, -1))
     return -0.5 * (n * np.log(scales) + logs), scales
 
 
-def _gains(system: DeviationSystem, variances: FloatArray, n_times: int) -> _Gains:
-    """Kalman gains for a sensor of unit variance and inputs of the given variances, (G, D)."""
+def _gaps(counted: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Where nothing was measured before the end of a demonstration, (T, D, K); (T, 1, 1) if that never was."""
+    ahead = np.logical_or.accumulate(counted[::-1])[::-1]
+    gaps = ahead & ~counted
+    return gaps if gaps[1:].any() else gaps[:, :1, :1]
+
+
+def _gains(system: DeviationSystem, variances: FloatArray, gaps: NDArray[np.bool_]) -> _Gains:
+    """Kalman gains for a sensor of unit variance and inputs of the given variances, (G, D or 1)."""
     (a, b), (c, e) = np.moveaxis(system.transition[:, 0, VELOCITY:, VELOCITY:], 0, -1)
     noise_v, noise_p = system.input_vector[:, 0, VELOCITY:].T
-    q = variances[..., None] * system.variances.T
+    q = variances[..., None] * system.variances[:, 0]
     q_vv, q_vp, q_pp = q * noise_v**2, q * noise_v * noise_p, q * noise_p**2
-    vv = vp = pp = np.zeros(q.shape)
+    vv = vp = pp = np.zeros(np.broadcast_shapes(q.shape, gaps.shape[1:]))
     steps = [(vp, pp, pp + 1)]
-    for _ in range(1, n_times):
+    for gap in gaps[1:]:
         av, ap, cv, cp = a * vv + b * vp, a * vp + b * pp, c * vv + e * vp, c * vp + e * pp
         vv, vp, pp = a * av + b * ap + q_vv, c * av + e * ap + q_vp, c * cv + e * cp + q_pp
         s = pp + 1
-        gain_v, gain_p = vp / s, pp / s
+        weight = np.where(gap, 0.0, 1 / s)
+        gain_v, gain_p = vp * weight, pp * weight
         steps.append((gain_v, gain_p, s))
-        vv, vp, pp = vv - gain_v * vp, gain_v, gain_p
+        vv, vp, pp = vv - gain_v * vp, vp - gain_v * pp, pp - gain_p * pp
     return _Gains(*(np.stack(x) for x in zip(*steps, strict=True)))
 
 
@@ -146,7 +153,7 @@ def _squared_innovations(paths: FloatArray, weights: FloatArray, gains: _Gains, 
     Parameters
     ----------
     paths : (T, D, C) array, what is filtered.
-    weights : (T, G, D, C or 1) array.
+    weights : (T, G, D or 1, C or 1) array.
     moves : A of velocity and position, (C or 1, 2, 2).
     """
     (a, b), (c, e) = np.moveaxis(moves, 0, -1)
