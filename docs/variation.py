@@ -105,7 +105,7 @@ def table(results: dict[str, dict[str, list[Score]]]) -> Iterator[str]:
         for model, scores in models.items():
             means, errors = np.mean(scores, axis=0), np.std(scores, axis=0) / np.sqrt(len(scores))
             cells = [f"{m:.2f} ± {e:.2f}" for m, e in zip(means[:2], errors[:2], strict=True)]
-            cells += [f"{100 * means[2]:.1f}", f"{100 * means[3]:.1f} ± {100 * errors[3]:.1f}"]
+            cells += [f"{100 * m:.1f} ± {100 * e:.1f}" for m, e in zip(means[2:], errors[2:], strict=True)]
             yield f"| {name}, n = {len(scores)} | {model} | " + " | ".join(cells) + " |"
 
 

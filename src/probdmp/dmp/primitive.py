@@ -140,16 +140,16 @@ def task_for(
 
     Parameters
     ----------
-    start, goal : (D,) arrays, data units. Where the start is NaN it is uncertain, as those of the demonstrations were.
+    start : (D,) array, data units. Where it is NaN it is uncertain, as those of the demonstrations were.
+    goal : (D,) array, data units. Not given it is NaN in the task, not told: see `Primitive.goals`; with joint weights it has its
+        learned spread.
     duration : seconds.
     start_velocity : (D,) array, data units per second; uncertain likewise where it is NaN, or not given.
     """
     shape, hint = (primitive.n_dof,), f"One number for each of {', '.join(primitive.names)}."
-    # Forcing terms that are redrawn at every step know no spread of the goal; joint parameters have one, unless it is told.
-    learned_goal = np.full(shape, np.nan) if primitive.configuration.weight_uncertainty == "joint" else primitive.goal
     return Task(
         check_array(primitive.start if start is None else start, "start", shape, missing=True, hint=hint),
-        learned_goal if goal is None else check_array(goal, "goal", shape, hint=hint),
+        np.full(shape, np.nan) if goal is None else check_array(goal, "goal", shape, hint=hint),
         np.asarray(primitive.duration if duration is None else check_seconds(duration, "duration")),
         None if start_velocity is None else check_array(start_velocity, "start_velocity", shape, missing=True, hint=hint),
     )

@@ -31,7 +31,8 @@ def fit_primitive(
 ) -> tuple[Primitive, FitReport]:
     """Learn a primitive from K demonstrations, each with its own start, goal, duration and length."""
     if options.weight_model == "hierarchical" and configuration.scaling == "paper":
-        hint = "Scaled by each goal, a movement is not linear in goal and weights, which vary together."
+        hint = "Scaled by each goal, a movement is not linear in goal and weights, which vary together. "
+        hint += 'Use weight_model="pooled", or ProbabilisticDMP.as_published().'
         raise InputError('scaling="none" with weight_model="hierarchical"', 'scaling="paper"', hint)
     paths = [smooth_path(d, options.smoothing) for d in demonstrations]
     velocities = [scheme_velocities(p, d.dt, configuration.discretization) for p, d in zip(paths, demonstrations, strict=True)]
