@@ -30,6 +30,7 @@ JOINT = {"weight_model": "hierarchical", "weight_uncertainty": "joint"}
 MODELS = {
     "pooled, independent": {"weight_model": "pooled", "weight_uncertainty": "independent"},
     "hierarchical, joint": JOINT,
+    "– without deviations": JOINT | {"forcing_noise": "posterior"},
     "– goal conditioned on": JOINT | {"goal_handling": "condition"},
     "– goal as attractor": JOINT | {"goal_handling": "attractor"},
 }
@@ -89,7 +90,7 @@ def measure(name: str, folder: Path = RECORDINGS, classes: slice = slice(None)) 
             training = [d for i, d in enumerate(members) if i % FOLDS != fold]
             fitted: dict[str, Primitive] = {}
             for model, settings in MODELS.items():
-                kind = settings["weight_model"]
+                kind = settings["weight_model"] + settings.get("forcing_noise", "")
                 if kind not in fitted:
                     fitted[kind] = ProbabilisticDMP(**settings).fit(training).primitive_
                 handling = settings.get("goal_handling", "blend")

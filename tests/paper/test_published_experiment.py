@@ -48,6 +48,7 @@ def test_as_published_has_the_papers_choices():
     assert replace(PUBLISHED, forcing_noise="predictive") == Experiment().configuration
     default = ProbabilisticDMP()
     assert (default.discretization, default.scaling) == ("exact", "none")
+    assert (default.weight_model, default.weight_uncertainty) == ("hierarchical", "joint")
 
 
 def test_the_default_experiment_is_the_papers():

@@ -36,7 +36,8 @@ class Primitive:
     weight_precisions: FloatArray
     """alpha, (D,) array: prior precision of the weights, 1 / data units squared."""
     forcing_precisions: FloatArray
-    """beta, (D,) array: precision of the forcing targets around their mean, 1 / data units squared."""
+    """beta, (D,) array, 1 / data units squared: precision of the forcing term around what the weights say; of pooled weights that
+    are redrawn, around their mean."""
     observation_variances: FloatArray
     """R, (D,) array: variance of the position sensors, data units squared, > 0."""
     goal_displacements: FloatArray

@@ -63,6 +63,7 @@ class ProbabilisticDMP:
     -----
     Wherever `start`, `goal`, `duration`, `dt` are not given, they are as learned; for recordings, the recording's own first
     row, length and dt, and the learned goal. Positions are in data units, times in seconds, arrays time first: (T, D).
+    Bands of position and velocity hardly depend on dt; those of the acceleration, which is white, grow as 1 / sqrt(dt).
     """
 
     def __init__(
@@ -242,8 +243,9 @@ class ProbabilisticDMP:
         Parameters
         ----------
         points : (time, position, std) each: seconds of the learned duration; (D,) array, data units, NaN for a degree of
-            freedom that is free; how far the movement may pass from it, a number or (D,) array, data units, > 0. Positions are
-            those of a movement from the learned start: from another one, it passes as much further on.
+            freedom that is free; how far the movement may pass from it, a number or (D,) array, data units, > 0; executions
+            deviate around that as anywhere. Positions are those of a movement from the learned start: from another one, it
+            passes as much further on.
         """
         return self._with(condition_primitive(self._learned(), points))
 
