@@ -93,7 +93,7 @@ def test_kalman_filtering_and_smoothing_are_inference(scheme):
     task, dt = task_for(estimator.primitive_), estimator.primitive_.duration / 24
     model = linear_gaussian_model(estimator.primitive_, task, dt, 25)
     observations = draw_observations(model, rng, missing=0.2)[..., 0]
-    arguments = {"dt": dt, "start": task.start, "goal": task.goal, "duration": float(task.duration)}
+    arguments = {"dt": dt, "start": task.start, "duration": float(task.duration)}
     for name, ours in (
         ("filtered", estimator.track(observations, **arguments)),
         ("smoothed", estimator.smooth(observations, **arguments)),
