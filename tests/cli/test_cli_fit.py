@@ -30,11 +30,11 @@ def test_fit_reports_how_well(folder, run_json, tmp_path, letters):
     assert summary["sensor_noise_stds"]["y"] == pytest.approx(np.sqrt(fitted.primitive_.observation_variances[1]))
     assert (summary["em_converged"], summary["em_iterations"]) == (None, None)  # of the paper's weights only
     paper = ("--weight-model", "pooled", "--weight-uncertainty", "independent")
-    (summary,) = run_json(
-        "fit", folder / "letters.npz", "-o", tmp_path / "m.probdmp", "--label", "c", "--n-basis", 8, *paper
-    )["primitives"]
+    model = tmp_path / "m.probdmp"
+    document = run_json("fit", folder / "letters.npz", "-o", model, "--label", "c", "--n-basis", 8, *paper)
+    (summary,) = document["primitives"]
     chosen = ProbabilisticDMP(8, **PAPERS_WEIGHTS).fit([d for d in letters if d.label == "c"])
-    assert load(tmp_path / "m.probdmp").primitive_.identity == chosen.primitive_.identity
+    assert load(model).primitive_.identity == chosen.primitive_.identity
     assert summary["em_converged"] is chosen.fit_report_.observation_noise.converged
 
 

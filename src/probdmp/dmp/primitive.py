@@ -36,8 +36,7 @@ class Primitive:
     weight_precisions: FloatArray
     """alpha, (D,) array: prior precision of the weights, 1 / data units squared."""
     forcing_precisions: FloatArray
-    """beta, (D,) array, 1 / data units squared: precision of the forcing term around what the weights say; of pooled weights that
-    are redrawn, around their mean."""
+    """beta, (D,) array, 1 / data units squared: precision of the forcing term around what the weights say."""
     observation_variances: FloatArray
     """R, (D,) array: variance of the position sensors, data units squared, > 0."""
     goal_displacements: FloatArray
@@ -142,8 +141,8 @@ def task_for(
     Parameters
     ----------
     start : (D,) array, data units. Where it is NaN it is uncertain, as those of the demonstrations were.
-    goal : (D,) array, data units. Not given it is NaN in the task, not told: see `Primitive.goals`; with joint weights it has its
-        learned spread.
+    goal : (D,) array, data units. Not given it is NaN in the task, not told: see `Primitive.goals`; with joint weights it has
+        its learned spread.
     duration : seconds.
     start_velocity : (D,) array, data units per second; uncertain likewise where it is NaN, or not given.
     """

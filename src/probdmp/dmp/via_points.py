@@ -38,8 +38,8 @@ def condition_primitive(primitive: Primitive, points: Sequence[ViaPoint]) -> Pri
         raise InputError(
             'weight_uncertainty="joint" to condition a movement',
             f'"{primitive.configuration.weight_uncertainty}"',
-            "Learn it with ProbabilisticDMP(), whose weights are hierarchical and joint: forcing terms that are redrawn at every "
-            "step say nothing about the rest of a movement.",
+            "Learn it with ProbabilisticDMP(), whose weights are hierarchical and joint: forcing terms that are redrawn at "
+            "every step say nothing about the rest of a movement.",
         )
     (mean, covariance), d = parameter_distribution(primitive), primitive.n_dof
     factor = parameter_factor(covariance)

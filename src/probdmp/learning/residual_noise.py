@@ -92,7 +92,7 @@ def _residuals(primitive: Primitive, executions: JointExecutions, observed: Floa
     covariances = np.linalg.solve(np.eye(r) + prior @ (some.mT @ (some * weights)), prior)
     means = mean + (covariances @ (some.mT @ (weights * surprise)))[..., 0]
     left = np.where(seen, errors - np.matmul(designs, means[:, None, :, None])[..., 0], np.nan)
-    lengths = observed.shape[0] - np.argmax(seen.any(axis=1)[:, ::-1], axis=-1)
+    lengths = observed.shape[0] - np.argmax(np.logical_or.reduce(seen, axis=1)[:, ::-1], axis=-1)
     typical = int(np.argsort(lengths)[k // 2])
     eigenvalues, vectors = np.linalg.eigh((covariances[typical] + covariances[typical].T) / 2)
     spreads = designs[typical, :, : lengths[typical]] @ (vectors * np.sqrt(np.maximum(eigenvalues, 0.0)))
