@@ -1,6 +1,6 @@
 """Measures the models of variation on executions that were left out and writes docs/variation.md: `make variation`.
 
-The recordings are found through the environment variable PROBDMP_RECORDINGS, as in the tests. Takes about seven minutes.
+The recordings are found through the environment variable PROBDMP_RECORDINGS, as in the tests. Takes about ten minutes.
 """
 
 import os
