@@ -280,7 +280,7 @@ class AlarmAt:
     def __init__(self, tick):
         self.tick, self.shown = tick, []
 
-    def monitor(self, primitive):
+    def monitor(self, primitive, task, dt):
         self.shown = []
         detector, verdict = self, SimpleNamespace(failed=False)
 
