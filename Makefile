@@ -31,7 +31,7 @@ figures: $(VENV)/.demo
 results: $(VENV)/.demo
 	$(BIN)/python docs/results.py
 
-# The table in docs/variation.md, from the same recordings; about seven minutes.
+# The table in docs/variation.md, from the same recordings; about ten minutes.
 variation: $(VENV)/.demo
 	$(BIN)/python docs/variation.py
 

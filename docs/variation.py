@@ -1,6 +1,6 @@
 """Measures the models of variation on executions that were left out and writes docs/variation.md: `make variation`.
 
-The recordings are found through the environment variable PROBDMP_RECORDINGS, as in the tests. Takes about seven minutes.
+The recordings are found through the environment variable PROBDMP_RECORDINGS, as in the tests. Takes about ten minutes.
 """
 
 import os
@@ -30,6 +30,7 @@ JOINT = {"weight_model": "hierarchical", "weight_uncertainty": "joint"}
 MODELS = {
     "pooled, independent": {"weight_model": "pooled", "weight_uncertainty": "independent"},
     "hierarchical, joint": JOINT,
+    "– without deviations": JOINT | {"forcing_noise": "posterior"},
     "– goal conditioned on": JOINT | {"goal_handling": "condition"},
     "– goal as attractor": JOINT | {"goal_handling": "attractor"},
 }
@@ -89,7 +90,7 @@ def measure(name: str, folder: Path = RECORDINGS, classes: slice = slice(None)) 
             training = [d for i, d in enumerate(members) if i % FOLDS != fold]
             fitted: dict[str, Primitive] = {}
             for model, settings in MODELS.items():
-                kind = settings["weight_model"]
+                kind = settings["weight_model"] + settings.get("forcing_noise", "")
                 if kind not in fitted:
                     fitted[kind] = ProbabilisticDMP(**settings).fit(training).primitive_
                 handling = settings.get("goal_handling", "blend")
@@ -105,7 +106,7 @@ def table(results: dict[str, dict[str, list[Score]]]) -> Iterator[str]:
         for model, scores in models.items():
             means, errors = np.mean(scores, axis=0), np.std(scores, axis=0) / np.sqrt(len(scores))
             cells = [f"{m:.2f} ± {e:.2f}" for m, e in zip(means[:2], errors[:2], strict=True)]
-            cells += [f"{100 * means[2]:.1f}", f"{100 * means[3]:.1f} ± {100 * errors[3]:.1f}"]
+            cells += [f"{100 * m:.1f} ± {100 * e:.1f}" for m, e in zip(means[2:], errors[2:], strict=True)]
             yield f"| {name}, n = {len(scores)} | {model} | " + " | ".join(cells) + " |"
 
 

@@ -11,6 +11,9 @@ from probdmp.gaussian import LinearGaussianModel, sample_sequences
 
 BATCH_SHAPES = ((), (2,), (2, 3))
 
+PAPERS_WEIGHTS = {"weight_model": "pooled", "weight_uncertainty": "independent"}
+"""Arguments of ProbabilisticDMP."""
+
 seeds = st.integers(0, 2**32 - 1)
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from strategies import PAPERS_WEIGHTS
 
 from probdmp import PrimitiveLibrary, ProbabilisticDMP, load, load_detector, write_demonstrations
 from probdmp.demonstrations import Demonstration
@@ -27,7 +28,14 @@ def test_fit_reports_how_well(folder, run_json, tmp_path, letters):
     assert summary["units"] == "mm"
     assert summary["reproduction_error"] == pytest.approx(np.sqrt(np.mean(errors**2)))
     assert summary["sensor_noise_stds"]["y"] == pytest.approx(np.sqrt(fitted.primitive_.observation_variances[1]))
-    assert summary["em_converged"] is fitted.fit_report_.observation_noise.converged
+    assert (summary["em_converged"], summary["em_iterations"]) == (None, None)  # of the paper's weights only
+    paper = ("--weight-model", "pooled", "--weight-uncertainty", "independent")
+    model = tmp_path / "m.probdmp"
+    document = run_json("fit", folder / "letters.npz", "-o", model, "--label", "c", "--n-basis", 8, *paper)
+    (summary,) = document["primitives"]
+    chosen = ProbabilisticDMP(8, **PAPERS_WEIGHTS).fit([d for d in letters if d.label == "c"])
+    assert load(model).primitive_.identity == chosen.primitive_.identity
+    assert summary["em_converged"] is chosen.fit_report_.observation_noise.converged
 
 
 def test_recordings_without_labels_make_one_primitive(folder, run_json, run, tmp_path):
@@ -50,6 +58,10 @@ def test_published_is_the_papers_configuration(folder, run, run_json, tmp_path):
     assert load(model, "c").get_params() == published.get_params()
     clash = run("fit", folder / "letters.npz", "-o", model, "--published", "--scaling", "none")
     assert (clash.exit_code, "the paper's configuration decides" in clash.stderr.lower()) == (2, True)
+    clash = run("fit", folder / "letters.npz", "-o", model, "--published", "--weight-model", "hierarchical")
+    assert (clash.exit_code, "any of --discretization, --scaling, --weight-model" in clash.stderr) == (2, True)
+    alone = run("fit", folder / "letters.npz", "-o", model, "--scaling", "paper")
+    assert (alone.exit_code, 'Use weight_model="pooled"' in " ".join(alone.stderr.split())) == (2, True)
 
 
 def test_degrees_of_freedom_left_out_of_scaling_are_named(run, run_json, tmp_path):
@@ -59,6 +71,7 @@ def test_degrees_of_freedom_left_out_of_scaling_are_named(run, run_json, tmp_pat
     data, model = tmp_path / "d.npz", tmp_path / "m.probdmp"
     write_demonstrations(data, [Demonstration(path, 0.02, names=("x", "y")) for path in paths])
     arguments = ("fit", data, "-o", model, "--scaling", "paper", "--n-basis", 8)
+    arguments += ("--weight-model", "pooled", "--weight-uncertainty", "independent")
     assert run_json(*arguments)["primitives"][0]["not_scaled"] == ["y"]
     assert "scaled" in run(*arguments).stdout
     assert "scaling paper (not y)" in run("inspect", model).stdout

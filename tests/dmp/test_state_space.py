@@ -32,7 +32,7 @@ def classical(primitive, task, dt, amplitudes):
     velocities = primitive.start_velocities / task.duration if task.start_velocity is None else task.start_velocity
     paths = [
         integrate_dmp(
-            primitive.weight_means[d], task.start[d], task.goal[d], float(task.duration), dt, n_steps,
+            primitive.weight_means[d], task.start[d], primitive.goals(task)[d], float(task.duration), dt, n_steps,
             primitive.configuration.alpha_z, velocities[d], amplitudes[d],
         )
         for d in range(primitive.n_dof)
@@ -184,7 +184,7 @@ def test_what_is_held_over_a_step_and_how_it_is_uncertain(seed, slower, scheme, 
         held = (-features(times) + 8 * at - features(times + 1.0)) / 6
         held[0] -= (features(times + 1.0)[0] - features(times)[0]) / 12
     model = linear_gaussian_model(primitive, task, dt, 61)
-    wanted = alpha_z**2 / 4 * task.goal + held @ primitive.weight_means.T
+    wanted = alpha_z**2 / 4 * primitive.goals(task) + held @ primitive.weight_means.T
     np.testing.assert_allclose(model.inputs[..., 0], wanted, rtol=1e-9, atol=1e-9 * np.abs(wanted).max())
     spread = np.einsum("tn,dnm,tm->td", at, primitive.weight_covariances, at) + 1 / primitive.forcing_precisions
     np.testing.assert_allclose(model.input_covariances[..., 0, 0], spread, rtol=1e-9)
@@ -238,7 +238,7 @@ def test_a_batch_of_tasks_is_its_members(seed, scheme, scaling, given_velocities
 def test_degrees_of_freedom_are_independent():
     primitive = make_primitive(np.random.default_rng(3), 3)
     task = task_for(primitive)
-    moved = task_for(primitive, goal=task.goal + np.array([0.0, 5.0, 0.0]))
+    moved = task_for(primitive, goal=primitive.goals(task) + np.array([0.0, 5.0, 0.0]))
     one, other = rolled(primitive, task, 0.01), rolled(primitive, moved, 0.01)
     np.testing.assert_array_equal(one.means[:, [0, 2]], other.means[:, [0, 2]])
     assert np.abs(one.means[-1, 1, 2] - other.means[-1, 1, 2]) > 4
@@ -256,7 +256,7 @@ def test_it_ends_at_the_goal_once_the_forcing_has_faded(scheme):
 def test_translation_moves_the_movement(scheme):
     primitive = make_primitive(np.random.default_rng(2), discretization=scheme, scaling="paper")
     here = task_for(primitive)
-    there = task_for(primitive, here.start + 7, here.goal + 7)
+    there = task_for(primitive, here.start + 7, primitive.goal + 7)
     one, other = rolled(primitive, here, 0.01), rolled(primitive, there, 0.01)
     np.testing.assert_allclose(other.means - one.means, np.broadcast_to([0, 0, 7.0], one.means.shape), atol=1e-8)
     np.testing.assert_allclose(other.covariances, one.covariances, rtol=1e-9, atol=1e-12)
@@ -281,7 +281,7 @@ def test_amplitude_scales_the_forcing_and_its_uncertainty():
     larger = linear_gaussian_model(primitive, task, 0.01, 50)
     spring = primitive.configuration.alpha_z**2 / 4
     forcing = as_learned.inputs[..., 0] - spring * primitive.goal
-    np.testing.assert_allclose(larger.inputs[..., 0], spring * task.goal + 3 * forcing, rtol=1e-9)
+    np.testing.assert_allclose(larger.inputs[..., 0], spring * primitive.goals(task) + 3 * forcing, rtol=1e-9)
     np.testing.assert_allclose(larger.input_covariances, 9 * as_learned.input_covariances, rtol=1e-9)
 
 
@@ -337,7 +337,7 @@ def test_the_first_acceleration_obeys_the_differential_equation(seed, duration):
     k, task = primitive.configuration.alpha_z, task_for(primitive, duration=duration)
     model = linear_gaussian_model(primitive, task, 0.01, 3)
     _, velocity, position = model.initial_mean.T
-    wanted = (k * (k / 4 * (task.goal - position) - duration * velocity)) / duration**2
+    wanted = (k * (k / 4 * (primitive.goals(task) - position) - duration * velocity)) / duration**2
     unforced = model.initial_mean[:, 0] - wanted
     forcing = primitive.weight_means @ basis_features(np.array(1.0), primitive.configuration.n_basis)
     np.testing.assert_allclose(unforced, forcing / duration**2, rtol=1e-9, atol=1e-9 * np.abs(wanted).max())

@@ -1,13 +1,13 @@
 """What is asked of an execution: as given, or as learned."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 from strategies import make_primitive
 
 from probdmp.demonstrations import Demonstration
-from probdmp.dmp import Task, demonstrated_tasks, task_for
+from probdmp.dmp import Task, demonstrated_tasks, linear_gaussian_model, task_for
 from probdmp.errors import InputError, InputTypeError
 
 
@@ -19,7 +19,7 @@ def primitive():
 def test_what_is_not_given_is_as_learned(primitive):
     task = task_for(primitive)
     np.testing.assert_array_equal(task.start, primitive.start)
-    np.testing.assert_array_equal(task.goal, primitive.goal)
+    np.testing.assert_array_equal(primitive.goals(task), primitive.goal)
     assert task.duration == primitive.duration
     assert task.duration.shape == ()
     assert task.start_velocity is None
@@ -50,13 +50,21 @@ def test_bad_points_are_refused_by_name(primitive, name, bad, error, match):
         task_for(primitive, **{name: bad})
 
 
-def test_a_goal_that_is_not_told_is_as_learned(primitive):
-    """With joint weights it has its learned spread too, so the task does not name one."""
-    joint = replace(primitive, configuration=replace(primitive.configuration, scaling="none", weight_uncertainty="joint"))
-    task = task_for(joint)
+@pytest.mark.parametrize("weight_uncertainty", ["independent", "joint"])
+def test_a_goal_that_is_not_told_is_not_in_the_task(primitive, weight_uncertainty):
+    """It is as learned, with joint weights with its learned spread."""
+    changed = replace(primitive.configuration, scaling="none", weight_uncertainty=weight_uncertainty)
+    p = replace(primitive, configuration=changed)
+    task = task_for(p)
     assert np.isnan(task.goal).all()
-    np.testing.assert_array_equal(joint.goals(task), primitive.goal)
-    np.testing.assert_array_equal(joint.goals(task_for(joint, goal=[1, 2])), [1, 2])
+    np.testing.assert_array_equal(p.goals(task), primitive.goal)
+    np.testing.assert_array_equal(p.goals(task_for(p, goal=[1, 2])), [1, 2])
+
+
+def test_the_model_of_a_goal_that_is_not_told_is_that_of_the_learned_one(primitive):
+    silent, told = (linear_gaussian_model(primitive, task_for(primitive, goal=g), 0.01, 20) for g in (None, primitive.goal))
+    for field in fields(silent):
+        np.testing.assert_array_equal(getattr(silent, field.name), getattr(told, field.name))
 
 
 def test_a_start_may_be_unknown_and_a_goal_may_not(primitive):

@@ -10,6 +10,7 @@ from strategies import make_primitive, random_covariance, seeds
 
 from probdmp.demonstrations import Demonstration
 from probdmp.dmp import Variation, linear_gaussian_model, task_for
+from probdmp.dmp.deviations import lasting_variances
 from probdmp.errors import InputError
 from probdmp.execution import (
     OnlineExecution,
@@ -38,12 +39,12 @@ def varied(seed=0, n_dof=2, n_basis=4, **changes):
 
 
 class Dense:
-    """The joint Gaussian of x = (p0, v0, g - p0, w) of all degrees of freedom, and of everything linear in it, written out."""
+    """The joint Gaussian of x = (p0, v0, g - p0, w, eps) of all degrees of freedom, and of everything linear in it."""
 
     def __init__(self, primitive, dt=DT, steps=STEPS, duration=None):
         p, self.p = primitive, primitive
         d, n = p.n_dof, p.configuration.n_basis + 3
-        self.d, self.n, self.steps = d, n, steps
+        self.d, self.steps = d, steps
         duration = p.duration if duration is None else duration
         columns = []
         for j in range(n):  # H, column by column, from rollouts of primitives with one parameter
@@ -54,18 +55,33 @@ class Dense:
             )  # fmt: skip
             task = task_for(one, one.start, one.goal, duration)
             columns.append(filter_sequence(linear_gaussian_model(one, task, dt, steps)).filtered.means[:, 0])
-        self.H = np.stack(columns, axis=-1)  # (T, 3, n)
-        self.mean = np.column_stack([p.start, p.variation.means]).ravel()
-        V = np.zeros((d, n, d, n))
-        V[:, 1:, :, 1:] = p.variation.covariance.reshape(d, n - 1, d, n - 1)
+        A, B, variances = self.noise(duration, dt)
+        E = np.zeros((steps, 3, steps - 1))
+        for t in range(1, steps):
+            E[t] = A @ E[t - 1]
+            E[t, :, t - 1] += B
+        self.H = np.concatenate([np.stack(columns, axis=-1), E], axis=-1)  # (T, 3, n + T - 1)
+        self.n, self.n_parameters = n + steps - 1, n
+        self.mean = np.column_stack([p.start, p.variation.means, np.zeros((d, steps - 1))]).ravel()
+        V = np.zeros((d, self.n, d, self.n))
+        V[:, 1:n, :, 1:n] = p.variation.covariance.reshape(d, n - 1, d, n - 1)
         for i in range(d):
             V[i, 0, i, 0] = p.start_covariances[i, 1, 1]
             V[i, 0, i, 1] = V[i, 1, i, 0] = p.start_covariances[i, 0, 1]
-        self.V = V.reshape(d * n, d * n)
+            V[i, n:, i, n:] = variances[i] * np.eye(steps - 1)
+        self.V = V.reshape(d * self.n, d * self.n)
 
-    def rows(self, step, dof, derivative=2):
+    def noise(self, duration, dt):
+        """A, B and the variances of eps, as the paper's system has them for weights that are known."""
+        independent = replace(self.p.configuration, weight_uncertainty="independent")
+        p = replace(self.p, configuration=independent, weight_covariances=np.zeros_like(self.p.weight_covariances))
+        model = linear_gaussian_model(p, task_for(p, duration=duration), dt, 2)
+        return model.transition[0], model.input_matrix[0, :, 0], model.input_covariances[0, :, 0, 0]
+
+    def rows(self, step, dof, derivative=2, deviating=True):
         row = np.zeros((self.d, self.n))
         row[dof] = self.H[step, derivative]
+        row[dof, self.n_parameters :] *= deviating
         return row.ravel()
 
     def know_start(self, start):
@@ -106,7 +122,7 @@ def prepared(primitive, start, goal=None, start_velocity=None, dt=DT, steps=STEP
         dense.know([unit[i * dense.n + 1] for i in told], [start_velocity[i] * duration for i in told], [1e-12] * len(told))
     if goal is not None:
         last, own = round(duration / dt), range(dense.d)
-        dense.know([dense.rows(last, i) for i in own], goal, primitive.variation.residual_variances)
+        dense.know([dense.rows(last, i, deviating=False) for i in own], goal, primitive.variation.residual_variances)
     return dense
 
 
@@ -238,6 +254,7 @@ def test_units_and_the_order_of_degrees_of_freedom_change_nothing():
         variation=Variation(*(a * unit**k for a, k in zip(p.variation.arrays().values(), (1, 2, 2), strict=True))),
         **{name: getattr(p, name) * unit for name in lengths},
         **{name: getattr(p, name) * unit**2 for name in squares},
+        forcing_precisions=p.forcing_precisions / unit**2,
     )
     one = track_recording(p, task_for(p, goal=[0.1, 0.2]), Demonstration(observed, DT))
     other = track_recording(scaled, task_for(scaled, goal=[100.0, 200.0]), Demonstration(observed * unit, DT))
@@ -248,12 +265,47 @@ def test_units_and_the_order_of_degrees_of_freedom_change_nothing():
     turned = replace(
         p,
         variation=Variation(m[::-1], c[np.ix_(order, order)], r[::-1]),
-        **{name: getattr(p, name)[::-1] for name in (*lengths, *squares)},
+        **{name: getattr(p, name)[::-1] for name in (*lengths, *squares, "forcing_precisions")},
     )
     swapped = track_recording(turned, task_for(turned, goal=[0.2, 0.1]), Demonstration(observed[:, ::-1], DT))
     close(swapped.means[:, ::-1], one.means)
     close(swapped.log_likelihoods, one.log_likelihoods)
     close(swapped.contributions[:, ::-1], one.contributions)
+
+
+# --- what the parameters leave over -----------------------------------------------------------------------------------
+
+
+def pushed(p, push=0.3):
+    """The command after a robot that had followed was pushed aside and held there for a few ticks."""
+    e = OnlineExecution(p, task_for(p, goal=p.goal), DT)
+    wanted = e.step(p.start)
+    for t in range(12):
+        there = wanted.position + (push if t > 8 else 0.0)
+        wanted = e.step(there)
+    return wanted.position - there
+
+
+def test_the_command_follows_a_robot_that_was_pushed():
+    """Constant weights alone must explain the push by all of the movement so far."""
+    changes = {"forcing_precisions": np.full(2, (0.5 * 25**2 / 4) ** -2)}
+    narrow = 1e-4 * np.eye(2 * 6)
+    p = varied(12, **changes)
+    p = replace(p, variation=replace(p.variation, covariance=narrow * p.variation.covariance))
+    still = replace(p, configuration=replace(p.configuration, forcing_noise="posterior"))
+    undisturbed = pushed(p, 0.0)
+    assert np.all(np.abs(pushed(p) - undisturbed) < 0.2)
+    assert np.all(np.abs(pushed(still) - undisturbed) > 0.28)
+
+
+def test_bands_of_position_and_velocity_hardly_depend_on_the_rate_and_those_of_the_acceleration_do():
+    p = varied(13, duration=1.0)
+    p = replace(p, variation=replace(p.variation, covariance=1e-9 * p.variation.covariance))
+    slow, fast = (np.sqrt(np.diagonal(roll_out(p, task_for(p), dt).covariances, axis1=-2, axis2=-1)) for dt in (0.01, 0.001))
+    np.testing.assert_allclose(slow[:, :, 1:], fast[::10, :, 1:], atol=0.03 * slow[..., 1:].max(axis=(0, 1)).min())
+    np.testing.assert_allclose(fast[20:, :, 0].mean() / slow[20:, :, 0].mean(), np.sqrt(10), rtol=0.1)
+    end = slow[-1, :, 2] ** 2
+    np.testing.assert_allclose(end, lasting_variances(p), rtol=0.1)
 
 
 # --- commanded goals --------------------------------------------------------------------------------------------------
@@ -266,7 +318,7 @@ def test_the_movement_ends_at_the_goal(handling, far):
     goal = p.start + p.variation.means[:, 1] + far
     rolled = roll_out(p, task_for(p, goal=goal), DT)
     np.testing.assert_allclose(rolled.positions[-1], goal, atol=0.01 + 1e-3 * far)
-    assert np.all(rolled.position_stds[-1] < 0.01)
+    assert np.all(rolled.position_stds[-1] < 0.01 + np.sqrt(lasting_variances(p)))
 
 
 def test_near_goals_are_conditioned_on_and_far_ones_attract():

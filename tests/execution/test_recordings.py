@@ -46,7 +46,7 @@ def test_what_is_not_said_is_read_off_the_recording(primitive):
     (recording,) = recorded(primitive, np.random.default_rng(1), 1)
     task = task_of_recording(primitive, recording)
     np.testing.assert_array_equal(task.start, recording.positions[0])
-    np.testing.assert_array_equal(task.goal, primitive.goal)  # the goal cannot be read off an execution that may have failed
+    assert np.isnan(task.goal).all()  # the goal cannot be read off an execution that may have failed
     assert task.duration == recording.duration
     assert task.start_velocity is None
 

@@ -1,6 +1,7 @@
 """Learned movements that the paper's tests share."""
 
 import pytest
+from strategies import PAPERS_WEIGHTS
 
 from probdmp import ProbabilisticDMP, synthetic_letters
 
@@ -20,8 +21,8 @@ def published(letters):
 
 @pytest.fixture(scope="session")
 def default(letters):
-    """The default configuration, taught the letter a."""
-    return ProbabilisticDMP().fit(letters["a"][:10])
+    """The paper's model with the scheme and the amplitude that are default, taught the letter a."""
+    return ProbabilisticDMP(**PAPERS_WEIGHTS).fit(letters["a"][:10])
 
 
 @pytest.fixture(params=["published", "default"])

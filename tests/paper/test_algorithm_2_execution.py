@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from paper import equations as paper
 from reference import dense_posterior, system_at
-from strategies import draw_observations, make_primitive
+from strategies import PAPERS_WEIGHTS, draw_observations, make_primitive
 
 from probdmp import ProbabilisticDMP
 from probdmp.dmp import linear_gaussian_model, task_for
@@ -88,12 +88,12 @@ def test_the_likelihood_of_a_step_is_that_of_the_prediction(default, recording, 
 def test_kalman_filtering_and_smoothing_are_inference(scheme):
     """ "Kalman filtering and smoothing are directly applicable": both agree with conditioning the dense joint Gaussian."""
     rng = np.random.default_rng(1)
-    estimator = ProbabilisticDMP(discretization=scheme)
+    estimator = ProbabilisticDMP(discretization=scheme, **PAPERS_WEIGHTS)
     estimator.primitive_ = make_primitive(rng, discretization=scheme)
     task, dt = task_for(estimator.primitive_), estimator.primitive_.duration / 24
     model = linear_gaussian_model(estimator.primitive_, task, dt, 25)
     observations = draw_observations(model, rng, missing=0.2)[..., 0]
-    arguments = {"dt": dt, "start": task.start, "goal": task.goal, "duration": float(task.duration)}
+    arguments = {"dt": dt, "start": task.start, "duration": float(task.duration)}
     for name, ours in (
         ("filtered", estimator.track(observations, **arguments)),
         ("smoothed", estimator.smooth(observations, **arguments)),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from paper import equations as paper
 from scipy.integrate import solve_ivp
-from strategies import make_primitive
+from strategies import PAPERS_WEIGHTS, make_primitive
 
 from probdmp import Demonstration, ProbabilisticDMP
 from probdmp.dmp import control_inputs, linear_gaussian_model, task_for
@@ -96,7 +96,7 @@ def test_weights_represent_the_shape_of_any_smooth_movement(configuration):
     rng, t = np.random.default_rng(0), np.linspace(0, 1, 201)
     for _ in range(5):
         waves = rng.standard_normal(4) @ np.sin(2 * np.pi * np.outer(rng.uniform(0.2, 1.5, 4), t) + rng.uniform(0, 6, (4, 1)))
-        model = ProbabilisticDMP.as_published() if configuration == "published" else ProbabilisticDMP()
+        model = ProbabilisticDMP.as_published() if configuration == "published" else ProbabilisticDMP(**PAPERS_WEIGHTS)
         model.fit([waves[:, None]], dt=0.01)
         assert model.fit_report_.reproduction_errors.max() < 0.01
 
@@ -147,7 +147,7 @@ def test_s_is_one_while_fitting_and_delta_g_is_stored():
     t = np.linspace(0, 1, 101)
     path = np.column_stack([4 * t**2 * (3 - 2 * t) + np.sin(6 * t), -2 * t])
     scaled = ProbabilisticDMP.as_published().fit([path], dt=0.01).primitive_
-    plain = ProbabilisticDMP(discretization="semi_implicit_euler").fit([path], dt=0.01).primitive_
+    plain = ProbabilisticDMP(discretization="semi_implicit_euler", **PAPERS_WEIGHTS).fit([path], dt=0.01).primitive_
     np.testing.assert_array_equal(scaled.goal_displacements, path[-1] - path[0])
     assert scaled.scaled == (True, True)
     np.testing.assert_allclose(scaled.amplitudes(task_for(scaled)), 1.0, rtol=1e-15)
@@ -432,6 +432,6 @@ def test_several_demonstrations_give_the_variance_of_the_forcing_term(letters):
     variances = []
     for factor in (1.0, 2.0):
         demonstrations = [Demonstration((mean + factor * (path - mean))[:, None], 0.01) for path in paths]
-        primitive = ProbabilisticDMP(scaling="none").fit(demonstrations).primitive_
+        primitive = ProbabilisticDMP(**PAPERS_WEIGHTS).fit(demonstrations).primitive_
         variances.append(1 / primitive.forcing_precisions[0])
     assert variances[1] == pytest.approx(4 * variances[0], rel=0.2)

@@ -7,7 +7,7 @@ import pytest
 from paper import equations as paper
 from reference import dense_posterior, system_at
 from scipy.optimize import minimize_scalar
-from strategies import draw_observations, make_primitive
+from strategies import PAPERS_WEIGHTS, draw_observations, make_primitive
 
 from probdmp import ProbabilisticDMP
 from probdmp.dmp import Configuration, Primitive, Task, demonstrated_tasks, linear_gaussian_model, task_for
@@ -129,7 +129,7 @@ def test_each_demonstration_has_its_own_start_goal_and_duration(scheme):
     for duration in (0.8, 1.0, 1.4):
         start, goal = rng.uniform(-1, 1, (2, 2))
         paths.append(roll_out(truth, task_for(truth, start, goal, duration), 0.002).positions)
-    learned = ProbabilisticDMP(10, discretization=scheme, smoothing=0.0).fit(paths, dt=0.002)
+    learned = ProbabilisticDMP(10, discretization=scheme, smoothing=0.0, **PAPERS_WEIGHTS).fit(paths, dt=0.002)
     assert learned.fit_report_.reproduction_errors.max() < 0.02
 
 
@@ -240,7 +240,7 @@ def test_EM_ends_where_the_likelihood_is_largest(demonstrated):
 @pytest.mark.parametrize("configuration", ["published", "default"])
 def test_EM_never_lowers_the_likelihood_while_learning(letters, configuration, forcing_noise):
     """As learned from recordings: the log-likelihood of the demonstrations at each iteration, and it converges."""
-    learned = ProbabilisticDMP(forcing_noise=forcing_noise)
+    learned = ProbabilisticDMP(forcing_noise=forcing_noise, **PAPERS_WEIGHTS)
     if configuration == "published":
         learned = ProbabilisticDMP.as_published(forcing_noise=forcing_noise)
     noise = learned.fit(letters["s"][:10]).fit_report_.observation_noise

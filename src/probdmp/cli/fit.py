@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
 __all__ = ["fit"]
 
+DECIDED = dict.fromkeys(("discretization", "scaling", "weight_model", "weight_uncertainty"))
+"""What --published leaves no choice of."""
+
 
 def fit(
     files: Annotated[list[Path], typer.Argument(metavar="FILE…", help="Demonstrations (.npz).", show_default=False)],
@@ -34,11 +37,25 @@ def fit(
     label: Annotated[str | None, typer.Option(metavar="LABEL", help="Learn this movement only.")] = None,
     columns: Columns = None,
     n_basis: Annotated[int, typer.Option(metavar="N", help="Basis functions per degree of freedom.")] = 30,
+    weight_model: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="hierarchical (the default): each demonstration has its own weights; pooled (the paper): all have the same.",
+        ),
+    ] = None,
+    weight_uncertainty: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="joint (the default): weights stay for an execution; independent (the paper): redrawn at every step.",
+        ),
+    ] = None,
     forcing_noise: Annotated[
         str,
         typer.Option(
             metavar="NAME",
-            help="predictive: executions stray as the demonstrations do; posterior: only the mean is uncertain.",
+            help="predictive: the forcing term strays from its weights as in the demonstrations; posterior: it does not.",
         ),
     ] = "predictive",
     discretization: Annotated[
@@ -49,7 +66,8 @@ def fit(
         str | None,
         typer.Option(
             metavar="NAME",
-            help="none (the default) or paper: the shape grows with the distance from start to goal.",
+            help="none (the default) or paper: the shape grows with the distance from start to goal. Needs "
+            "--weight-model pooled --weight-uncertainty independent.",
         ),
     ] = None,
     smoothing: Annotated[
@@ -63,7 +81,7 @@ def fit(
         bool,
         typer.Option(
             "--published",
-            help="The paper's configuration: semi_implicit_euler and its scaling.",
+            help="The paper's configuration: semi_implicit_euler, its scaling, pooled and independent weights.",
         ),
     ] = False,
     as_json: Json = False,
@@ -75,6 +93,7 @@ def fit(
     """
     check_output(output, ".probdmp")
     given = {"forcing_noise": forcing_noise, "discretization": discretization, "scaling": scaling}
+    given |= {"weight_model": weight_model, "weight_uncertainty": weight_uncertainty}
     settings = _settings({"n_basis": n_basis, "smoothing": smoothing, **given}, published)
     from probdmp.detection import FailureDetector
     from probdmp.estimator import PrimitiveLibrary
@@ -100,13 +119,14 @@ def _settings(given: Mapping[str, Any], published: bool) -> dict[str, Any]:
     from probdmp.learning import LearningOptions
 
     chosen = {name: value for name, value in given.items() if value is not None}
-    if published and chosen.keys() & {"discretization", "scaling"}:
-        raise UsageError("--published, or --discretization and --scaling", "both", "The paper's configuration decides these.")
+    if published and chosen.keys() & DECIDED:
+        options = ", ".join("--" + name.replace("_", "-") for name in DECIDED)
+        raise UsageError(f"--published, or any of {options}", "both", "The paper's configuration decides these.")
     base = ProbabilisticDMP.as_published() if published else ProbabilisticDMP()
     settings = base.get_params() | chosen
     with usage():
         Configuration(**{field.name: settings[field.name] for field in fields(Configuration)})
-        LearningOptions(smoothing=settings["smoothing"])
+        LearningOptions(settings["weight_model"], settings["smoothing"])
     return settings
 
 

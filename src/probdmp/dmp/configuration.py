@@ -30,7 +30,7 @@ class Configuration:
     scaling: str = "none"
     """`"none"`: the forcing term keeps its learned size; `"paper"`: it grows with (g - p0) / mean (g - p0)."""
     forcing_noise: str = "predictive"
-    """`"posterior"`: the variance of the mean forcing term; `"predictive"`: with the regression noise 1 / beta."""
+    """`"posterior"`: the weights alone are uncertain; `"predictive"`: the forcing term also has white noise, 1 / beta."""
     weight_uncertainty: str = "independent"
     """`"independent"`: the forcing term is redrawn at every step (the paper);
     `"joint"`: the weights are constant and unknown."""
@@ -56,7 +56,8 @@ class Configuration:
             raise InputError(
                 'scaling="none" with weight_uncertainty="joint"',
                 'scaling="paper"',
-                "Scaled by an unknown goal, the movement is not linear in what is unknown.",
+                "Scaled by an unknown goal, the movement is not linear in what is unknown. "
+                'Use weight_model="pooled" and weight_uncertainty="independent", or ProbabilisticDMP.as_published().',
             )
 
 

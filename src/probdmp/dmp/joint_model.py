@@ -2,10 +2,11 @@
 
 All that is unknown of an execution is drawn once, x = (p0, theta) of every degree of freedom, and a task tells part of it:
 
-    x = mean + F z,  z ~ N(0, I);    state[t] = rows[t] x,    o[t] = (position of state[t]) + v[t],  v[t] ~ N(0, R)
+    x = mean + F z,  z ~ N(0, I);    state[t] = rows[t] x + d[t],    o[t] = (position of state[t]) + v[t],  v[t] ~ N(0, R)
 
-There is no process noise: what is seen early in a movement says how all of it will go. Inference is over z, in
-`probdmp.gaussian.static`; F has no more columns than x has independent directions.
+What is seen early in a movement says how all of it will go. d is what the parameters leave over (`probdmp.dmp.deviations`).
+What is told of an execution, its goal or its start velocity, is told of rows[t] x. Inference over z and d is in
+`probdmp.gaussian.augmented`; F has no more columns than x has independent directions.
 """
 
 from typing import NamedTuple
@@ -13,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from probdmp.checks import FloatArray
+from probdmp.dmp.deviations import DeviationSystem, deviation_system, lasting_variances
 from probdmp.dmp.goal_handling import conditioned_part
 from probdmp.dmp.path_distribution import parameter_distribution, parameter_factor
 from probdmp.dmp.primitive import Primitive
@@ -21,7 +23,16 @@ from probdmp.dmp.task import Task
 from probdmp.dmp.transformation_system import POSITION
 from probdmp.gaussian import Belief, linear_moments, observe, unit_belief
 
-__all__ = ["JointExecutions", "JointModel", "joint_executions", "joint_model", "mean_positions", "state_designs", "state_rows"]
+__all__ = [
+    "JointExecutions",
+    "JointModel",
+    "joint_executions",
+    "joint_model",
+    "mean_positions",
+    "position_designs",
+    "state_designs",
+    "state_rows",
+]
 
 START = 0
 """Where p0 is in x; the parameters follow, each one place further than in theta."""
@@ -52,6 +63,8 @@ class JointExecutions(NamedTuple):
     """With the batch axis (N)."""
     rows: FloatArray
     """(T, N, 3, n_basis + 3) array: each state as a function of what is unknown."""
+    system: DeviationSystem
+    """With the batch axis (N)."""
 
 
 def joint_model(primitive: Primitive, task: Task, end_rows: FloatArray) -> JointModel:
@@ -74,7 +87,8 @@ def joint_model(primitive: Primitive, task: Task, end_rows: FloatArray) -> Joint
         row = np.eye(mean.shape[-1])[START_VELOCITY + 1]
         model = _told(model, row, told, (TOLD_TOLERANCE * primitive.ranges) ** 2, START_VELOCITY + 1, handling)
     variation = primitive.variation
-    tolerances = primitive.observation_variances if variation is None else variation.residual_variances
+    left_over = primitive.observation_variances + lasting_variances(primitive)
+    tolerances = left_over if variation is None else variation.residual_variances
     # A goal that was not told stays where it was learned: from another start, the movement to it is another.
     moved = np.where(np.isnan(task.goal), primitive.start - primitive.starts(task), np.nan)
     model = _moved(model, end_rows, moved, tolerances, GOAL + 1, handling)
@@ -108,6 +122,12 @@ def state_designs(model: JointModel, rows: FloatArray) -> tuple[FloatArray, Floa
     return np.matmul(model.means, rows.mT), _design(model.factors, rows)
 
 
+def position_designs(model: JointModel, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The same of the positions alone: (*batch, D) and (*batch, D, r)."""
+    row = rows[..., POSITION, :]
+    return _along(model.means, row), _design(model.factors, row[..., None, :])[..., 0, :]
+
+
 def joint_executions(primitive: Primitive, tasks: Task, dts: FloatArray, n_steps: int) -> JointExecutions:
     """What is known about executions before they begin.
 
@@ -123,7 +143,8 @@ def joint_executions(primitive: Primitive, tasks: Task, dts: FloatArray, n_steps
     responses = np.stack([parameter_responses(configuration, float(step), length) for step in steps], axis=1)
     rows = state_rows(responses, tasks.duration)
     end_rows = rows[lasts, np.arange(len(steps)), POSITION]
-    return JointExecutions(joint_model(primitive, tasks, end_rows), rows[:n_steps])
+    system = deviation_system(primitive, tasks.duration, dts)
+    return JointExecutions(joint_model(primitive, tasks, end_rows), rows[:n_steps], system)
 
 
 def mean_positions(executions: JointExecutions) -> FloatArray:

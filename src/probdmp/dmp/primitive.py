@@ -36,7 +36,7 @@ class Primitive:
     weight_precisions: FloatArray
     """alpha, (D,) array: prior precision of the weights, 1 / data units squared."""
     forcing_precisions: FloatArray
-    """beta, (D,) array: precision of the forcing targets around their mean, 1 / data units squared."""
+    """beta, (D,) array, 1 / data units squared: precision of the forcing term around what the weights say."""
     observation_variances: FloatArray
     """R, (D,) array: variance of the position sensors, data units squared, > 0."""
     goal_displacements: FloatArray
@@ -140,7 +140,9 @@ def task_for(
 
     Parameters
     ----------
-    start, goal : (D,) arrays, data units. Where the start is NaN it is uncertain, as those of the demonstrations were.
+    start : (D,) array, data units. Where it is NaN it is uncertain, as those of the demonstrations were.
+    goal : (D,) array, data units. Not given it is NaN in the task, not told: see `Primitive.goals`; with joint weights it has
+        its learned spread.
     duration : seconds.
     start_velocity : (D,) array, data units per second; uncertain likewise where it is NaN, or not given.
     """

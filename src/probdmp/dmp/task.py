@@ -22,7 +22,7 @@ class Task:
     start: FloatArray
     """p0, (*batch, D) array, data units; NaN where it is not known: as learned, with its learned variance."""
     goal: FloatArray
-    """g, (*batch, D) array, data units; NaN where it is not told: as learned, where the weights are joint with its variance."""
+    """g, (*batch, D) array, data units; NaN where it is not told: as learned, with joint weights uncertain."""
     duration: FloatArray
     """T_d, (*batch) array, seconds."""
     start_velocity: FloatArray | None = None

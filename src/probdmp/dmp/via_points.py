@@ -1,7 +1,8 @@
 """A movement made to pass through points: its joint Gaussian conditioned on them.
 
 A via-point says y(t) = H(t) theta = position - start, up to its own noise, of every degree of freedom that it names. What the
-demonstrations say about the rest of the movement follows, by the same algebra as while executing.
+demonstrations say about the rest of the movement follows, by the same algebra as while executing. Executions deviate from
+H(t) theta (`probdmp.dmp.deviations`), at a via-point too.
 """
 
 from collections.abc import Sequence
@@ -37,8 +38,8 @@ def condition_primitive(primitive: Primitive, points: Sequence[ViaPoint]) -> Pri
         raise InputError(
             'weight_uncertainty="joint" to condition a movement',
             f'"{primitive.configuration.weight_uncertainty}"',
-            'Learn it with ProbabilisticDMP(weight_model="hierarchical", weight_uncertainty="joint"): forcing terms that are '
-            "redrawn at every step say nothing about the rest of a movement.",
+            "Learn it with ProbabilisticDMP(), whose weights are hierarchical and joint: forcing terms that are redrawn at "
+            "every step say nothing about the rest of a movement.",
         )
     (mean, covariance), d = parameter_distribution(primitive), primitive.n_dof
     factor = parameter_factor(covariance)

@@ -39,14 +39,15 @@ class ProbabilisticDMP:
     Parameters
     ----------
     n_basis : basis functions per degree of freedom.
-    weight_model : `"pooled"`: one set of weights behind all demonstrations (the paper); `"hierarchical"`: each has its own,
-        drawn from a Gaussian over start velocity, goal and weights of all degrees of freedom that is learned.
-    weight_uncertainty : `"independent"`: the forcing term is redrawn at every step (the paper); `"joint"`: the weights are
-        constant and unknown, so that bands are those of whole executions and each observation tells about the rest.
-    forcing_noise : `"predictive"`: single executions stray from the mean forcing term as the demonstrations do;
-        `"posterior"`: only the mean itself is uncertain, and the sensor noise has to explain the spread.
+    weight_model : `"hierarchical"`: each demonstration has its own weights, drawn from a Gaussian over start velocity, goal and
+        weights of all degrees of freedom that is learned; `"pooled"`: one set of weights behind all of them (the paper).
+    weight_uncertainty : `"joint"`: the weights are constant and unknown, so that bands are those of whole executions and each
+        observation tells about the rest; `"independent"`: the forcing term is redrawn at every step (the paper).
+    forcing_noise : `"predictive"`: the forcing term strays from what the weights say, at every step, as in the
+        demonstrations; `"posterior"`: only the weights are uncertain, and the sensor noise has to explain the rest.
     discretization : `"exact"` or `"semi_implicit_euler"` (the paper).
-    scaling : `"none"` or `"paper"`: the forcing term grows with the distance from start to goal.
+    scaling : `"none"` or `"paper"`: the forcing term grows with the distance from start to goal; this needs pooled weights and
+        an independent forcing term.
     alpha_z : spring constant of the transformation system, dimensionless.
     smoothing : window of the Savitzky-Golay filter as a fraction of a demonstration.
     goal_handling : what a commanded goal does to joint weights. `"condition"`: the movement changes with its end as the
@@ -62,14 +63,15 @@ class ProbabilisticDMP:
     -----
     Wherever `start`, `goal`, `duration`, `dt` are not given, they are as learned; for recordings, the recording's own first
     row, length and dt, and the learned goal. Positions are in data units, times in seconds, arrays time first: (T, D).
+    Bands of position and velocity hardly depend on dt; those of the acceleration, which is white, grow as 1 / sqrt(dt).
     """
 
     def __init__(
         self,
         n_basis: int = 30,
         *,
-        weight_model: str = "pooled",
-        weight_uncertainty: str = "independent",
+        weight_model: str = "hierarchical",
+        weight_uncertainty: str = "joint",
         forcing_noise: str = "predictive",
         discretization: str = "exact",
         scaling: str = "none",
@@ -236,13 +238,14 @@ class ProbabilisticDMP:
         return sample_trajectories(self._learned(), task, self._step(dt), count, rng, sensor_noise)
 
     def condition(self, points: Sequence[ViaPoint]) -> Self:
-        """The same movement through via-points; needs `weight_uncertainty="joint"`.
+        """The same movement through via-points; needs `weight_uncertainty="joint"`, the default.
 
         Parameters
         ----------
         points : (time, position, std) each: seconds of the learned duration; (D,) array, data units, NaN for a degree of
-            freedom that is free; how far the movement may pass from it, a number or (D,) array, data units, > 0. Positions are
-            those of a movement from the learned start: from another one, it passes as much further on.
+            freedom that is free; how far the movement may pass from it, a number or (D,) array, data units, > 0; executions
+            deviate around that as anywhere. Positions are those of a movement from the learned start: from another one, it
+            passes as much further on.
         """
         return self._with(condition_primitive(self._learned(), points))
 

@@ -14,7 +14,7 @@ from probdmp.demonstrations import Demonstration, stack_positions
 from probdmp.dmp import Primitive, Task, linear_gaussian_model, stack_tasks, task_for
 from probdmp.dmp.joint_model import joint_executions
 from probdmp.errors import InputError, InputTypeError
-from probdmp.execution.joint_filtering import FilteredRecordings, filter_joint, joint_moments
+from probdmp.execution.joint_filtering import FilteredRecordings, filter_joint, smooth_joint
 from probdmp.execution.trajectory import GaussianTrajectory, TrackedTrajectory
 from probdmp.gaussian import filter_sequence, smooth_sequence
 
@@ -68,7 +68,7 @@ def smooth_recording(primitive: Primitive, task: Task, recording: Demonstration)
     _check_recordings(primitive, [recording])
     if primitive.configuration.weight_uncertainty == "joint":
         executions = joint_executions(primitive, stack_tasks([task]), np.array([recording.dt]), recording.n_samples)
-        means, covariances = joint_moments(filter_joint(primitive, executions, recording.positions[:, None])[1])
+        means, covariances = smooth_joint(primitive, executions, recording.positions[:, None])
         return GaussianTrajectory(recording.times, means[:, 0], covariances[:, 0], primitive.names, primitive.units)
     model = linear_gaussian_model(primitive, task, recording.dt, recording.n_samples)
     smoothed = smooth_sequence(model, recording.positions[..., None])
@@ -105,7 +105,7 @@ def filter_recordings(primitive: Primitive, tasks: Sequence[Task], recordings: S
     observed = stack_positions(recordings)
     dts = np.array([r.dt for r in recordings])
     if primitive.configuration.weight_uncertainty == "joint":
-        return filter_joint(primitive, joint_executions(primitive, stack_tasks(tasks), dts, len(observed)), observed)[0]
+        return filter_joint(primitive, joint_executions(primitive, stack_tasks(tasks), dts, len(observed)), observed)
     forward = filter_sequence(linear_gaussian_model(primitive, stack_tasks(tasks), dts, len(observed)), observed[..., None])
     return FilteredRecordings(forward.filtered, forward.innovations, forward.innovation_covariances, forward.log_likelihoods)
 

@@ -6,7 +6,7 @@ from probdmp.checks import FloatArray
 from probdmp.dmp import Primitive, Task, linear_gaussian_model, stack_tasks, step_count
 from probdmp.dmp.joint_model import joint_executions
 from probdmp.dmp.transformation_system import POSITION
-from probdmp.execution.joint_filtering import joint_moments, sample_joint
+from probdmp.execution.joint_filtering import roll_out_joint, sample_joint
 from probdmp.execution.trajectory import GaussianTrajectory
 from probdmp.gaussian import filter_sequence, sample_sequences
 
@@ -23,7 +23,7 @@ def roll_out(primitive: Primitive, task: Task, dt: float) -> GaussianTrajectory:
     n_steps = step_count(float(task.duration), dt)
     times = np.arange(n_steps, dtype=np.float64) * dt
     if primitive.configuration.weight_uncertainty == "joint":
-        means, covariances = joint_moments(joint_executions(primitive, stack_tasks([task]), np.array([dt]), n_steps))
+        means, covariances = roll_out_joint(joint_executions(primitive, stack_tasks([task]), np.array([dt]), n_steps))
         return GaussianTrajectory(times, means[:, 0], covariances[:, 0], primitive.names, primitive.units)
     rolled = filter_sequence(linear_gaussian_model(primitive, task, dt, n_steps)).filtered
     return GaussianTrajectory(times, rolled.means, rolled.covariances, primitive.names, primitive.units)

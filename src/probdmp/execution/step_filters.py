@@ -7,11 +7,10 @@ import numpy as np
 
 from probdmp.checks import FloatArray
 from probdmp.dmp import Primitive, Task, linear_gaussian_model, stack_tasks
-from probdmp.dmp.joint_model import joint_executions, state_designs, state_rows
+from probdmp.dmp.joint_model import joint_executions, state_rows
 from probdmp.dmp.responses import continue_responses, parameter_responses
-from probdmp.dmp.transformation_system import POSITION
-from probdmp.execution.joint_filtering import state_moments
-from probdmp.gaussian import observe, predict, update
+from probdmp.execution.joint_filtering import start_deviation, state_moments, update_joint
+from probdmp.gaussian import predict, predict_deviation, update
 
 __all__ = ["STEP_FILTERS", "Sensed", "StepFilter"]
 
@@ -78,37 +77,39 @@ class IndependentFilter:
 
 
 class JointFilter:
-    """Conditioning of parameters that stay; arguments as for `IndependentFilter`."""
+    """Conditioning of parameters that stay and of what deviates from them; arguments as for `IndependentFilter`."""
 
     def __init__(self, primitive: Primitive, task: Task, dt: float, chunk: int) -> None:
         self._primitive, self._chunk = primitive, chunk
         self._duration, self._phase_step = task.duration, float(dt / task.duration)
         self._responses = parameter_responses(primitive.configuration, self._phase_step, chunk)
         self._first, self._step = 0, 0
-        batch = joint_executions(primitive, stack_tasks([task]), np.array([dt]), 1).model
+        batch, _, system = joint_executions(primitive, stack_tasks([task]), np.array([dt]), 1)
         belief = batch.belief
         self._model = batch._replace(
             means=batch.means[0],
             factors=batch.factors[0],
             belief=belief._replace(mean=belief.mean[0], covariance=belief.covariance[0]),
         )
+        self._transition, self._noise = system.transition[0], system.noise[0]
+        self._deviation = start_deviation(self._model)
 
     def update(self, measured: FloatArray) -> Sensed:
         """Condition on positions."""
-        offsets, designs = state_designs(self._model, self._rows())
-        residuals = measured - offsets[:, POSITION]
-        seen = observe(self._model.belief, residuals, designs[:, POSITION], self._primitive.observation_variances)
+        variances = self._primitive.observation_variances
+        seen, self._deviation, *_ = update_joint(self._model, self._deviation, self._rows(), measured, variances)
         self._model = self._model._replace(belief=seen.belief)
         return Sensed(seen.log_likelihoods, seen.innovation, np.diagonal(seen.innovation_covariance))
 
     def predict(self) -> tuple[FloatArray, FloatArray]:
-        """The parameters stay; the state is another function of them."""
+        """The parameters stay, what deviates from them goes on; the state is another function of them."""
         self._step += 1
+        self._deviation = predict_deviation(self._deviation, self._transition, self._noise)
         if self._step - self._first == len(self._responses):
             last = self._responses[-1]
             before, self._first = self._step - 1, self._step
             self._responses = continue_responses(self._primitive.configuration, self._phase_step, self._chunk, before, last)
-        return state_moments(self._model, self._rows())
+        return state_moments(self._model, self._deviation, self._rows())
 
     def _rows(self) -> FloatArray:
         return state_rows(self._responses[self._step - self._first], self._duration)

@@ -58,7 +58,7 @@ class GaussianTrajectory:
 
     @property
     def acceleration_stds(self) -> FloatArray:
-        """(T, D) array, data units per second squared; with independent weights it grows as 1 / sqrt(dt)."""
+        """(T, D) array, data units per second squared; it grows as 1 / sqrt(dt)."""
         return self._stds(ACCELERATION)
 
     def _stds(self, row: int) -> FloatArray:

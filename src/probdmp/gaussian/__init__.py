@@ -1,5 +1,13 @@
 """Linear-Gaussian inference: filter, smoother, sampling. It knows nothing of movement and can be used alone."""
 
+from probdmp.gaussian.augmented import (
+    AugmentedUpdate,
+    Deviation,
+    no_deviation,
+    observe_deviation,
+    predict_deviation,
+    smooth_deviations,
+)
 from probdmp.gaussian.density import gaussian_log_density
 from probdmp.gaussian.filtering import FilteredSequence, filter_sequence, predict, update
 from probdmp.gaussian.model import GaussianSequence, LinearGaussianModel
@@ -8,7 +16,9 @@ from probdmp.gaussian.smoothing import smooth_sequence
 from probdmp.gaussian.static import Belief, StaticUpdate, linear_moments, observe, unit_belief
 
 __all__ = [
+    "AugmentedUpdate",
     "Belief",
+    "Deviation",
     "FilteredSequence",
     "GaussianSequence",
     "LinearGaussianModel",
@@ -16,9 +26,13 @@ __all__ = [
     "filter_sequence",
     "gaussian_log_density",
     "linear_moments",
+    "no_deviation",
     "observe",
+    "observe_deviation",
     "predict",
+    "predict_deviation",
     "sample_sequences",
+    "smooth_deviations",
     "smooth_sequence",
     "unit_belief",
     "update",

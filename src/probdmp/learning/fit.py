@@ -16,6 +16,7 @@ from probdmp.learning.forcing_targets import forcing_targets, scheme_velocities
 from probdmp.learning.observation_noise import ObservationNoise, estimate_observation_noise
 from probdmp.learning.options import FitReport, LearningOptions
 from probdmp.learning.pooled_weights import pooled_weights
+from probdmp.learning.residual_noise import with_residual_noise
 from probdmp.learning.varied_weights import varied_weights
 from probdmp.learning.weight_regression import WeightPosterior
 
@@ -30,7 +31,8 @@ def fit_primitive(
 ) -> tuple[Primitive, FitReport]:
     """Learn a primitive from K demonstrations, each with its own start, goal, duration and length."""
     if options.weight_model == "hierarchical" and configuration.scaling == "paper":
-        hint = "Scaled by each goal, a movement is not linear in goal and weights, which vary together."
+        hint = "Scaled by each goal, a movement is not linear in goal and weights, which vary together. "
+        hint += 'Use weight_model="pooled", or ProbabilisticDMP.as_published().'
         raise InputError('scaling="none" with weight_model="hierarchical"', 'scaling="paper"', hint)
     paths = [smooth_path(d, options.smoothing) for d in demonstrations]
     velocities = [scheme_velocities(p, d.dt, configuration.discretization) for p, d in zip(paths, demonstrations, strict=True)]
@@ -53,17 +55,22 @@ def _with_observation_noise(
     """The primitive with its R, and how far its rollouts are from the demonstrations."""
     observed, dts = stack_positions(demonstrations), np.array([d.dt for d in demonstrations])
     joint = moving.configuration.weight_uncertainty == "joint"
-    if joint and moving.variation is not None:  # R is what the variation leaves unexplained
-        squared_errors = _squared_errors(observed, mean_positions(joint_executions(moving, tasks, dts, len(observed))))
-        return moving, FitReport(np.sqrt(squared_errors) / moving.ranges, None)
-    model = linear_gaussian_model(moving, tasks, dts, len(observed))
-    squared_errors = _squared_errors(observed, filter_sequence(model).filtered.means[..., POSITION])
+    if joint and moving.variation is not None:
+        rollouts = mean_positions(joint_executions(moving, tasks, dts, len(observed)))
+    else:
+        model = linear_gaussian_model(moving, tasks, dts, len(observed))
+        rollouts = filter_sequence(model).filtered.means[..., POSITION]
+    squared_errors = _squared_errors(observed, rollouts)
     relative_errors = np.sqrt(squared_errors) / moving.ranges
-    if joint:  # R is what the mean movement leaves unexplained
+    if not joint:
+        noise = _observation_noise(model, observed, squared_errors, moving.ranges)
+        return replace(moving, observation_variances=noise.variances), FitReport(relative_errors, noise)
+    if moving.variation is None:  # what the mean movement leaves unexplained
         variances = np.maximum(squared_errors.mean(axis=0), OBSERVATION_NOISE_FLOOR * moving.ranges**2)
-        return replace(moving, observation_variances=variances), FitReport(relative_errors, None)
-    noise = _observation_noise(model, observed, squared_errors, moving.ranges)
-    return replace(moving, observation_variances=noise.variances), FitReport(relative_errors, noise)
+        moving = replace(moving, observation_variances=variances)
+    if moving.configuration.forcing_noise == "predictive":
+        moving = with_residual_noise(moving, tasks, dts, observed)
+    return moving, FitReport(relative_errors, None)
 
 
 def _squared_errors(observed: FloatArray, rollouts: FloatArray) -> FloatArray:

@@ -32,7 +32,7 @@ class FitReport:
     reproduction_errors: FloatArray
     """(K, D) array: root mean square of demonstration minus rollout of the same task, as a fraction of the range."""
     observation_noise: ObservationNoise | None
-    """The EM iterations behind R; None where R is what the parameters of each demonstration leave unexplained."""
+    """The EM iterations behind R; None with joint weights, whose R comes from `probdmp.learning.residual_noise`."""
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
