@@ -89,9 +89,9 @@ class CalibratedRule:
 
     def calibration(self, primitive: Primitive, task: Task) -> Calibration:
         """What is normal for an execution."""
-        by_label = self.calibrations.get(tells_goal(primitive, task))
+        by_label = self.calibrations.get(tells_goal(task))
         if by_label is None:
-            told, other = ("tell", "do not") if tells_goal(primitive, task) else ("do not tell", "do")
+            told, other = ("tell", "do not") if tells_goal(task) else ("do not tell", "do")
             raise InputError(
                 f"a detector calibrated on executions that {told} their goal",
                 f"one calibrated on executions that {other}",
@@ -160,7 +160,7 @@ class CalibratedRule:
 def _tasks(member: Member, knows_goal: bool) -> list[Task]:
     """Tasks of the recordings if they tell, or do not tell, the goal; none otherwise."""
     if member.tasks is not None:
-        agree = all(tells_goal(member.primitive, task) == knows_goal for task in member.tasks)
+        agree = all(tells_goal(task) == knows_goal for task in member.tasks)
         return list(member.tasks) if agree else []
     if not knows_goal:
         return own_tasks(member.primitive, member.recordings)

@@ -25,12 +25,9 @@ from probdmp.learning import left_out_variations
 __all__ = ["TrajectoryFamily", "tells_goal"]
 
 
-def tells_goal(primitive: Primitive, task: Task) -> bool:
-    """Whether an execution is told where it has to end, in every degree of freedom.
-
-    Independent weights have the learned goal where none is told, so the learned goal is no news.
-    """
-    return not (np.isnan(task.goal).any() or np.array_equal(task.goal, primitive.goal))
+def tells_goal(task: Task) -> bool:
+    """Whether an execution is told where it has to end, in every degree of freedom."""
+    return not bool(np.isnan(task.goal).any())
 
 
 class TrajectoryFamily:
@@ -65,7 +62,7 @@ class TrajectoryFamily:
 
     def source(self, primitive: Primitive, task: Task, dt: float) -> TrajectorySource:
         """For one execution."""
-        return TrajectorySource(self._expectation(primitive, tells_goal(primitive, task)), task, dt)
+        return TrajectorySource(self._expectation(primitive, tells_goal(task)), task, dt)
 
     def replay(
         self, primitive: Primitive, tasks: Sequence[Task], recordings: Sequence[Demonstration]
@@ -74,19 +71,19 @@ class TrajectoryFamily:
         profile = self.profiles[primitive.identity]
         ticks = [ticks_of_recording(primitive, profile, *pair) for pair in zip(tasks, recordings, strict=True)]
         values: list[FloatArray] = [np.empty(0)] * len(ticks)
-        for knows_goal in {tells_goal(primitive, task) for task in tasks}:
-            chosen = [k for k, task in enumerate(tasks) if tells_goal(primitive, task) == knows_goal]
+        for knows_goal in {tells_goal(task) for task in tasks}:
+            chosen = [k for k, task in enumerate(tasks) if tells_goal(task) == knows_goal]
             trajectory = self._expectation(primitive, knows_goal).trajectory
             for k, value in zip(chosen, values_of(trajectory, [ticks[k] for k in chosen]), strict=True):
                 values[k] = value
         for task, recording, value in zip(tasks, recordings, values, strict=True):
-            source = TrajectorySource(self._expectation(primitive, tells_goal(primitive, task)), task, recording.dt, value)
+            source = TrajectorySource(self._expectation(primitive, tells_goal(task)), task, recording.dt, value)
             yield source, _observations(recording, task)
 
     def left_out_maxima(self, member: Member, tasks: Sequence[Task]) -> FloatArray:
         """Largest value of every channel over each recording, judged by what the others teach: (K, C) array."""
         primitive = member.primitive
-        knows_goal = tells_goal(primitive, tasks[0])
+        knows_goal = tells_goal(tasks[0])
         profile = self.profiles[primitive.identity]
         maxima = []
         if primitive.identity not in self._left_out:
@@ -101,7 +98,7 @@ class TrajectoryFamily:
 
     def maxima(self, member: Member, tasks: Sequence[Task]) -> FloatArray:
         """Largest value of every channel over each recording, which the primitive has not learned from: (K, C) array."""
-        trajectory = self._expectation(member.primitive, tells_goal(member.primitive, tasks[0])).trajectory
+        trajectory = self._expectation(member.primitive, tells_goal(tasks[0])).trajectory
         profile = self.profiles[member.primitive.identity]
         pairs = zip(tasks, member.recordings, strict=True)
         ticks = [ticks_of_recording(member.primitive, profile, *pair) for pair in pairs]
