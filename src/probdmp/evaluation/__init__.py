@@ -4,7 +4,8 @@ from probdmp.evaluation.experiment import TASKS, Experiment
 from probdmp.evaluation.illustration import Illustration, illustrate
 from probdmp.evaluation.judges import DETECTORS, READINGS, Judge, Reading, learned_primitive
 from probdmp.evaluation.metrics import Rate, rate_of
-from probdmp.evaluation.outcomes import Finding, Outcome, Trace, outcomes_of
+from probdmp.evaluation.operating import RealizedRate, at_level, detected_within, level_realizing, realized_rates
+from probdmp.evaluation.outcomes import Finding, Judgement, Outcome, Trace, outcomes_of
 from probdmp.evaluation.protocol import Evaluation, evaluate
 from probdmp.evaluation.summary import FaultSummary, Summary, published_summary, summarize
 from probdmp.evaluation.trials import UNDISTURBED, Trial, commanded_tasks, draw_trials, group_by_label
@@ -20,20 +21,26 @@ __all__ = [
     "Finding",
     "Illustration",
     "Judge",
+    "Judgement",
     "Outcome",
     "Rate",
     "Reading",
+    "RealizedRate",
     "Summary",
     "Trace",
     "Trial",
+    "at_level",
     "commanded_tasks",
+    "detected_within",
     "draw_trials",
     "evaluate",
     "group_by_label",
     "illustrate",
     "learned_primitive",
+    "level_realizing",
     "outcomes_of",
     "published_summary",
     "rate_of",
+    "realized_rates",
     "summarize",
 ]

@@ -34,14 +34,22 @@ class Experiment:
     and duration are as learned. Thresholds are learned with the same knowledge."""
     faults: tuple[str, ...] = ("hold",)
     """Names of faults, some with a size, such as `"push:0.4"`; see `probdmp.demonstrations.fault_named`."""
-    configuration: Configuration = PUBLISHED
-    """How primitives are made; the paper's unless given. Readings of the paper's rule set the forcing noise themselves."""
+    configuration: Configuration | None = None
+    """How primitives are made. Unless given, as published for the paper's detector and as the library does for others. Readings
+    of the paper's rule set the forcing noise themselves; the calibrated detector learns how executions vary in any case."""
     false_alarm_rate: float = 0.01
     """What a calibrated detector is asked for, as a share of normal executions."""
     seeds: int = 1
     """Number of splits: with the seeds `seed`, `seed` + 1, …, figures pooled."""
     traces: bool = False
     """Whether judges are asked to keep their statistic over time, for operating curves."""
+
+    @property
+    def primitives_made(self) -> Configuration:
+        """How primitives are made, whether that was given or not."""
+        if self.configuration is not None:
+            return self.configuration
+        return PUBLISHED if self.detector == "paper" else Configuration()
 
     def __post_init__(self) -> None:
         for name in ("train", "test", "seeds"):
