@@ -1,5 +1,6 @@
 """The paper's experiment on any labelled demonstrations: protocol, judges, rates with intervals, latency."""
 
+from probdmp.evaluation.example import Example, example_of
 from probdmp.evaluation.experiment import TASKS, Experiment
 from probdmp.evaluation.illustration import Illustration, illustrate
 from probdmp.evaluation.judges import DETECTORS, READINGS, Judge, Reading, learned_primitive
@@ -16,6 +17,7 @@ __all__ = [
     "TASKS",
     "UNDISTURBED",
     "Evaluation",
+    "Example",
     "Experiment",
     "FaultSummary",
     "Finding",
@@ -34,6 +36,7 @@ __all__ = [
     "detected_within",
     "draw_trials",
     "evaluate",
+    "example_of",
     "group_by_label",
     "illustrate",
     "learned_primitive",

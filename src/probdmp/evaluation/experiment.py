@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from probdmp.checks import check_choice, check_count
 from probdmp.demonstrations import fault_named
+from probdmp.detection.options import DetectorOptions
 from probdmp.dmp import PUBLISHED, Configuration
 from probdmp.errors import InputTypeError
 
@@ -55,6 +56,7 @@ class Experiment:
         for name in ("train", "test", "seeds"):
             check_count(getattr(self, name), name)
         check_count(self.seed, "seed", least=0)
+        DetectorOptions(self.false_alarm_rate)
         check_choice(self.task, "task", TASKS)
         if isinstance(self.faults, str):
             raise InputTypeError("faults as a tuple of names", repr(self.faults), f"A single one: ({self.faults!r},).")

@@ -28,6 +28,7 @@ __all__ = [
     "fit_paper_detector",
     "judge_by_calibrated",
     "learned_primitive",
+    "shown_primitive",
 ]
 
 Progress = Callable[[str], None]
@@ -73,6 +74,14 @@ def learned_primitive(trial: Trial, configuration: Configuration) -> Primitive:
 @lru_cache(maxsize=128)
 def _learned(training: tuple[Demonstration, ...], configuration: Configuration) -> Primitive:
     return fit_primitive(training, configuration, LearningOptions())[0]
+
+
+def shown_primitive(trial: Trial, experiment: Experiment) -> Primitive:
+    """The primitive of a class as the first judge of the experiment has it, for pictures."""
+    if experiment.detector == "paper":
+        return learned_primitive(trial, replace(experiment.primitives_made, forcing_noise=READINGS[0].forcing_noise))
+    configuration = replace(experiment.primitives_made, weight_uncertainty="joint")
+    return fit_primitive(trial.training, configuration, LearningOptions("hierarchical"))[0]
 
 
 def _judge_by_paper(reading: Reading, trials: Sequence[Trial], experiment: Experiment, on_class: Progress) -> Judgement:
