@@ -9,7 +9,7 @@ from probdmp import write_demonstrations
 from probdmp.cli.evaluation_table import print_evaluation
 from probdmp.demonstrations import FAULTS, synthetic_letters
 from probdmp.dmp import Configuration
-from probdmp.evaluation import DETECTORS, READINGS, TASKS, Evaluation, Experiment, Finding, Judgement, Outcome
+from probdmp.evaluation import DETECTORS, READINGS, TASKS, Assessment, Evaluation, Experiment, Finding, Outcome
 from probdmp.evaluation import evaluate as evaluate_directly
 
 SMALL = ("--train", 3, "--test", 3)
@@ -54,7 +54,7 @@ def outcomes_with(faults):
 @pytest.mark.parametrize("faults", [("hold",), (*FAULTS, "wrong_goal:0.15")])
 def test_the_table_fits_into_eighty_columns(monkeypatch, capsys, faults):
     monkeypatch.setenv("COLUMNS", "80")
-    split = dict.fromkeys([reading.name for reading in READINGS], Judgement(outcomes_with(faults)))
+    split = dict.fromkeys([reading.name for reading in READINGS], Assessment(outcomes_with(faults)))
     print_evaluation(Evaluation(Experiment(faults=faults), {0: split}))
     table, _, _ = capsys.readouterr().out.partition("Intervals: 95 %, exact")
     cells = 3 if faults == ("hold",) else 1 + 8 + 2  # false alarms, detected, ever; false alarms, eight failures, two benign

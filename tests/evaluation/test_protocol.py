@@ -12,9 +12,9 @@ from probdmp.errors import InputError, InputTypeError
 from probdmp.evaluation import (
     DETECTORS,
     READINGS,
+    Assessment,
     Experiment,
     Finding,
-    Judgement,
     evaluate,
     illustrate,
     learned_primitive,
@@ -121,7 +121,7 @@ def early_judge(trials, experiment, on_class):
         }
         outcomes += outcomes_of(trial, findings)
         on_class(trial.label)
-    return Judgement(outcomes)
+    return Assessment(outcomes)
 
 
 def test_anyone_may_judge(demos, experiment):
@@ -149,7 +149,7 @@ def test_a_judge_sees_all_classes_of_a_seed_at_once(demos, experiment):
 
 def test_a_judge_that_forgets_some_is_refused(demos, experiment):
     with pytest.raises(InputError, match=r"from the judge 'lazy' an outcome for each of 6 test executions.*got 5"):
-        evaluate(demos, experiment, {"lazy": lambda *arguments: Judgement(early_judge(*arguments).outcomes[1:])})
+        evaluate(demos, experiment, {"lazy": lambda *arguments: Assessment(early_judge(*arguments).outcomes[1:])})
 
 
 def test_what_judges_share_is_learned_once(demos, experiment):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from probdmp.cli.detector_choice import DEFAULT_RATE, FalseAlarmRate
 from probdmp.cli.evaluation_table import print_evaluation
 from probdmp.cli.exit_codes import UsageError, usage
 from probdmp.cli.options import Columns, Json, Seed, check_output, names_of
@@ -42,12 +43,11 @@ def evaluate(
     seeds: Annotated[int, typer.Option(metavar="N", help="Splits, with the seeds S, S + 1, …; figures are pooled.")] = 1,
     detector: Annotated[
         str,
-        typer.Option(metavar="NAME", help="calibrated: for a rate of false alarms; paper: the paper's rule, in all its readings."),
+        typer.Option(
+            metavar="NAME", help="calibrated: for a rate of false alarms; paper: the paper's rule, in all its readings."
+        ),
     ] = "calibrated",
-    false_alarm_rate: Annotated[
-        float | None,
-        typer.Option(metavar="ALPHA", help="Of calibrated: share of normal executions that may be called failed. Default: 0.01."),
-    ] = None,
+    false_alarm_rate: FalseAlarmRate = None,
     fault: Annotated[str, typer.Option(metavar="NAMES", help=FAULT_HELP)] = "hold",
     task: Annotated[
         str,
@@ -55,7 +55,9 @@ def evaluate(
     ] = "known",
     configuration: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="Of paper: how primitives are made. published (the default) or default: the library's."),
+        typer.Option(
+            metavar="NAME", help="Of paper: how primitives are made. published (the default) or default: the library's."
+        ),
     ] = None,
     report: Annotated[
         Path | None, typer.Option("--report", metavar="FILE.html", help="Write a page with tables and figures.")
@@ -110,7 +112,7 @@ def _experiment(
     if configuration is not None:
         configurations = {"published": PUBLISHED, "default": Configuration()}
         chosen = configurations[check_choice(configuration, "configuration", configurations)]
-    rate = 0.01 if false_alarm_rate is None else false_alarm_rate
+    rate = DEFAULT_RATE if false_alarm_rate is None else false_alarm_rate
     return Experiment(**given, detector=detector, configuration=chosen, false_alarm_rate=rate)
 
 

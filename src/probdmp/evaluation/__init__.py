@@ -6,7 +6,7 @@ from probdmp.evaluation.illustration import Illustration, illustrate
 from probdmp.evaluation.judges import DETECTORS, READINGS, Judge, Reading, learned_primitive
 from probdmp.evaluation.metrics import Rate, rate_of
 from probdmp.evaluation.operating import RealizedRate, at_level, detected_within, level_realizing, realized_rates
-from probdmp.evaluation.outcomes import Finding, Judgement, Outcome, Trace, outcomes_of
+from probdmp.evaluation.outcomes import Assessment, Finding, Outcome, Trace, outcomes_of
 from probdmp.evaluation.protocol import Evaluation, evaluate
 from probdmp.evaluation.summary import FaultSummary, Summary, published_summary, summarize
 from probdmp.evaluation.trials import UNDISTURBED, Trial, commanded_tasks, draw_trials, group_by_label
@@ -16,6 +16,7 @@ __all__ = [
     "READINGS",
     "TASKS",
     "UNDISTURBED",
+    "Assessment",
     "Evaluation",
     "Example",
     "Experiment",
@@ -23,7 +24,6 @@ __all__ = [
     "Finding",
     "Illustration",
     "Judge",
-    "Judgement",
     "Outcome",
     "Rate",
     "Reading",

@@ -50,7 +50,7 @@ class Experiment:
         """How primitives are made, whether that was given or not."""
         if self.configuration is not None:
             return self.configuration
-        return PUBLISHED if self.detector == "paper" else Configuration()
+        return PUBLISHED if self.detector == "paper" else Configuration(weight_uncertainty="joint")
 
     def __post_init__(self) -> None:
         for name in ("train", "test", "seeds"):

@@ -1,7 +1,7 @@
 """Who decides whether an execution has failed.
 
 A judge is given the trials of all classes at once, so that it may learn from the training demonstrations of all of them, and
-returns a judgement: an outcome for each test execution, trial by trial, and where its thresholds come from. It sees no test
+returns an assessment: an outcome for each test execution, trial by trial, and where its thresholds come from. It sees no test
 demonstration before it has made up its mind how to judge. `outcomes_of` puts its findings together.
 """
 
@@ -15,7 +15,7 @@ from probdmp.demonstrations import Demonstration
 from probdmp.detection import FailureDetector
 from probdmp.dmp import Configuration, Primitive, Task
 from probdmp.evaluation.experiment import Experiment
-from probdmp.evaluation.outcomes import Finding, Judgement, Outcome, Trace, outcomes_of
+from probdmp.evaluation.outcomes import Assessment, Finding, Outcome, Trace, outcomes_of
 from probdmp.evaluation.trials import Trial, commanded_tasks
 from probdmp.learning import LearningOptions, fit_primitive
 
@@ -33,7 +33,7 @@ __all__ = [
 
 Progress = Callable[[str], None]
 """Called by a judge with its label after each class."""
-Judge = Callable[[Sequence[Trial], Experiment, Progress], Judgement]
+Judge = Callable[[Sequence[Trial], Experiment, Progress], Assessment]
 """(trials of one seed, the experiment with that seed, progress) to one outcome for each test, in the order of the trials."""
 
 
@@ -80,20 +80,21 @@ def shown_primitive(trial: Trial, experiment: Experiment) -> Primitive:
     """The primitive of a class as the first judge of the experiment has it, for pictures."""
     if experiment.detector == "paper":
         return learned_primitive(trial, replace(experiment.primitives_made, forcing_noise=READINGS[0].forcing_noise))
-    configuration = replace(experiment.primitives_made, weight_uncertainty="joint")
-    return fit_primitive(trial.training, configuration, LearningOptions("hierarchical"))[0]
+    return fit_primitive(trial.training, experiment.primitives_made, LearningOptions("hierarchical"))[0]
 
 
-def _judge_by_paper(reading: Reading, trials: Sequence[Trial], experiment: Experiment, on_class: Progress) -> Judgement:
+def _judge_by_paper(reading: Reading, trials: Sequence[Trial], experiment: Experiment, on_class: Progress) -> Assessment:
     outcomes: list[Outcome] = []
     for trial in trials:
         primitive, detector = fit_paper_detector(trial, reading, experiment)
         outcomes += _judged(trial, detector, primitive, experiment)
         on_class(trial.label)
-    return Judgement(outcomes)
+    return Assessment(outcomes)
 
 
-def judge_by_calibrated(trials: Sequence[Trial], experiment: Experiment, on_class: Progress, **parameters: object) -> Judgement:
+def judge_by_calibrated(
+    trials: Sequence[Trial], experiment: Experiment, on_class: Progress, **parameters: object
+) -> Assessment:
     """The calibrated detector: every class taught with its variation, all of them calibrated together.
 
     Parameters
@@ -109,7 +110,7 @@ def judge_by_calibrated(trials: Sequence[Trial], experiment: Experiment, on_clas
     for trial in trials:
         outcomes += _judged(trial, detector, primitives[trial.label], experiment)
         on_class(trial.label)
-    return Judgement(outcomes, detector.calibrations_)
+    return Assessment(outcomes, detector.calibrations_)
 
 
 def _judged(trial: Trial, detector: FailureDetector, primitive: Primitive, experiment: Experiment) -> list[Outcome]:

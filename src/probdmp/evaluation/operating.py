@@ -7,7 +7,7 @@ import numpy as np
 
 from probdmp.errors import InputError
 from probdmp.evaluation.metrics import Rate, rate_of
-from probdmp.evaluation.outcomes import Finding, Judgement, Outcome, Trace
+from probdmp.evaluation.outcomes import Assessment, Finding, Outcome, Trace
 from probdmp.evaluation.trials import UNDISTURBED
 
 __all__ = ["RealizedRate", "at_level", "detected_within", "level_realizing", "realized_rates"]
@@ -59,7 +59,7 @@ def detected_within(outcomes: Sequence[Outcome], fault: str, latencies: Sequence
     return [float(np.mean(np.array(delays) <= latency)) for latency in latencies]
 
 
-def realized_rates(judgements: Sequence[Judgement]) -> list[RealizedRate]:
+def realized_rates(assessments: Sequence[Assessment]) -> list[RealizedRate]:
     """False alarms at the thresholds for several nominal rates, all splits pooled; nothing unless classes share a threshold.
 
     The limits are beta-binomial: the rate that a threshold from n executions really has is beta distributed, and of those
@@ -68,17 +68,17 @@ def realized_rates(judgements: Sequence[Judgement]) -> list[RealizedRate]:
 
     Parameters
     ----------
-    judgements : of each split, with traces.
+    assessments : of each split, with traces.
     """
     from scipy.stats import betabinom
 
-    if any(len(judgement.calibrations) != 1 for judgement in judgements):
+    if any(len(assessment.calibrations) != 1 for assessment in assessments):
         return []
-    facts, m = [judgement.calibrations[0] for judgement in judgements], len(judgements[0].outcomes)
+    facts, m = [assessment.calibrations[0] for assessment in assessments], len(assessments[0].outcomes)
     found = []
     for nominal in facts[0].thresholds:
         levels = [one.thresholds[nominal] / one.threshold for one in facts]
-        judged = [o for j, level in zip(judgements, levels, strict=True) for o in at_level(j.outcomes, level)]
+        judged = [o for j, level in zip(assessments, levels, strict=True) for o in at_level(j.outcomes, level)]
         rate = rate_of(sum(o.false_alarm is not None for o in judged), len(judged))
         above = nominal * (facts[0].n + 1)
         limits = np.asarray(betabinom.ppf([0.025, 0.975], m, above, facts[0].n + 1 - above)) / m

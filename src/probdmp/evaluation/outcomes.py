@@ -7,7 +7,7 @@ from probdmp.checks import FloatArray, freeze_arrays
 from probdmp.detection import CalibrationFacts
 from probdmp.evaluation.trials import UNDISTURBED, Trial
 
-__all__ = ["Finding", "Judgement", "Outcome", "Trace", "outcomes_of"]
+__all__ = ["Assessment", "Finding", "Outcome", "Trace", "outcomes_of"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,7 +64,7 @@ class Outcome:
 
 
 @dataclass(frozen=True, slots=True)
-class Judgement:
+class Assessment:
     """All that a judge says of one split."""
 
     outcomes: Sequence[Outcome]

@@ -10,7 +10,7 @@ from probdmp.errors import InputError
 from probdmp.evaluation.experiment import Experiment
 from probdmp.evaluation.judges import DETECTORS, READINGS, Judge, Progress
 from probdmp.evaluation.metrics import BOOTSTRAP, CLOPPER_PEARSON
-from probdmp.evaluation.outcomes import Judgement, Outcome
+from probdmp.evaluation.outcomes import Assessment, Outcome
 from probdmp.evaluation.summary import Summary, published_summary, summarize
 from probdmp.evaluation.trials import draw_trials, group_by_label
 
@@ -22,7 +22,7 @@ class Evaluation:
     """What came of an experiment."""
 
     experiment: Experiment
-    by_seed: Mapping[int, Mapping[str, Judgement]]
+    by_seed: Mapping[int, Mapping[str, Assessment]]
     """By seed, then by judge."""
 
     @property
@@ -58,12 +58,12 @@ class Evaluation:
         }
 
     def _figures(self, name: str, summary: Summary) -> dict[str, Any]:
-        judgements = {seed: split[name] for seed, split in self.by_seed.items()}
-        facts = [{"seed": seed, **asdict(one)} for seed, j in judgements.items() for one in j.calibrations]
+        assessments = {seed: split[name] for seed, split in self.by_seed.items()}
+        facts = [{"seed": seed, **asdict(one)} for seed, j in assessments.items() for one in j.calibrations]
         figures = {**summary.as_dict(), "calibrations": facts}
-        if len(judgements) == 1:
+        if len(assessments) == 1:
             return figures
-        return {**figures, "per_seed": [{"seed": seed, **summarize(j.outcomes).as_dict()} for seed, j in judgements.items()]}
+        return {**figures, "per_seed": [{"seed": seed, **summarize(j.outcomes).as_dict()} for seed, j in assessments.items()]}
 
 
 def evaluate(
@@ -94,11 +94,11 @@ def evaluate(
         trials = draw_trials(demonstrations, split)
         by_seed[seed] = {name: judge(trials, split, on_class) for name, judge in judges.items()}
         tests = [trial.label for trial in trials for _ in trial.tests]
-        for name, judgement in by_seed[seed].items():
-            if [outcome.label for outcome in judgement.outcomes] != tests:
+        for name, assessment in by_seed[seed].items():
+            if [outcome.label for outcome in assessment.outcomes] != tests:
                 raise InputError(
                     f"from the judge {name!r} an outcome for each of {len(tests)} test executions, in the order of the trials",
-                    f"{len(judgement.outcomes)}",
+                    f"{len(assessment.outcomes)}",
                     "outcomes_of puts the findings of a trial together.",
                 )
     return Evaluation(experiment, by_seed)

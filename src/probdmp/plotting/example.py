@@ -18,14 +18,8 @@ def plot_example_path(ax: "Axes", example: Example, dof: int) -> "Axes":
     """One degree of freedom of both executions over the learned band, with the onset and the alarm."""
     plot_rollout(ax, example.rollout, dof)
     for name, recording in example.recordings.items():
-        faulty = name != UNDISTURBED
-        ax.plot(
-            recording.times,
-            recording.positions[:, dof],
-            color=FAULTY if faulty else RECORDED,
-            linestyle="--" if faulty else "-",
-            label=name if faulty else "as recorded",
-        )
+        color, line = (RECORDED, "-") if name == UNDISTURBED else (FAULTY, "--")
+        ax.plot(recording.times, recording.positions[:, dof], color=color, linestyle=line)
     _mark_onset(ax, example)
     finding, recording = example.findings[example.fault], example.recordings[example.fault]
     if finding.alarm is not None:
@@ -41,8 +35,8 @@ def plot_test_ratios(ax: "Axes", example: Example) -> "Axes":
         if finding.trace is not None:
             faulty = name != UNDISTURBED
             ratios = np.where(np.isfinite(finding.trace.test_ratios), finding.trace.test_ratios, np.nan)
-            style = {"color": FAULTY, "linestyle": "--"} if faulty else {"color": RECORDED, "linestyle": "-"}
-            ax.plot(finding.trace.times, ratios, label=name if faulty else "as recorded", **style)
+            label, color, line = (name, FAULTY, "--") if faulty else ("as recorded", RECORDED, "-")
+            ax.plot(finding.trace.times, ratios, color=color, linestyle=line, label=label)
     ax.axhline(1, color="0.2", linewidth=1, linestyle=":", label="threshold")
     _mark_onset(ax, example)
     alarm = example.findings[example.fault].alarm

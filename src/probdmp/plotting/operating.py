@@ -42,7 +42,8 @@ def plot_operating_curve(ax: "Axes", outcomes: Sequence[Outcome], summary: Summa
         if detected is not None:
             here = 100 * summary.false_alarms.rate, 100 * detected.rate
             ax.plot(*here, marker="o", color=series(k)["color"], clip_on=False)
-    ax.set(xlabel="False alarms [% of executions]", ylabel="Detected [%]", xlim=(0, 100 * LARGEST_RATE), ylim=(0, 101))
+    ax.set(xlabel="False alarms [% of executions]", ylabel="Detected [%]", xlim=(0, 100 * LARGEST_RATE))
+    _from_a_round_number(ax)
     ax.legend(loc="lower right", title="dots: as set")
     return ax
 
@@ -71,7 +72,8 @@ def plot_by_onset(ax: "Axes", summary: Summary) -> "Axes":
         shares = [100 * one.detected / one.n if one.n else np.nan for one in bins]
         if bins:
             ax.plot(middles, shares, marker=".", label=fault, **series(k))
-    ax.set(xlabel="Onset [% of the duration]", ylabel="Detected [%]", ylim=(0, 101), xlim=(30, 70))
+    ax.set(xlabel="Onset [% of the duration]", ylabel="Detected [%]", xlim=(30, 70))
+    _from_a_round_number(ax)
     ax.legend(loc="lower left")
     return ax
 
@@ -109,3 +111,10 @@ def plot_realized_rates(ax: "Axes", realized: Sequence[RealizedRate]) -> "Axes":
     ax.set_ylim(bottom=0)
     ax.legend(loc="upper left")
     return ax
+
+
+def _from_a_round_number(ax: "Axes") -> None:
+    """Percentages from the multiple of twenty below them, 80 at the most, to 100."""
+    heights = [np.asarray(line.get_ydata(), dtype=float) for line in ax.lines]
+    lowest = min((float(np.nanmin(values)) for values in heights if values.size), default=0.0)
+    ax.set_ylim(min(80.0, 20.0 * (lowest // 20)), 101)

@@ -36,6 +36,7 @@ PAGE = """<!doctype html>
   h1 {{ font-size: 1.6rem; }} h2 {{ font-size: 1.2rem; margin-top: 2.2rem; }}
   table {{ border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .9rem; margin: .6rem 0 1.2rem; }}
   th, td {{ text-align: left; padding: .35rem .9rem .35rem 0; border-bottom: 1px solid #ddd; vertical-align: top; }}
+  td small {{ display: block; color: #555; white-space: nowrap; }} h3 {{ font-size: 1rem; margin: 1.2rem 0 0; }}
   .wide {{ overflow-x: auto; }} figure {{ margin: 1rem 0; }} svg {{ width: 100%; height: auto; }}
   figcaption, .note {{ font-size: .9rem; color: #444; }} code {{ background: #f2f2f2; padding: .1rem .3rem; }}
 </style>
@@ -45,8 +46,9 @@ PAGE = """<!doctype html>
 <p><code>{command}</code></p>
 </html>
 """
-INTRODUCTION = """<p>{classes} were each learned from {train} demonstrations. {test} further executions of each were
-judged while they ran, as recorded and with faults that begin at a random moment. The executions were told {told}{seeds}.{asked}</p>"""
+INTRODUCTION = """<p>{classes} learned from {train} demonstrations. {test} further executions of each were
+judged while they ran, as recorded and with faults that begin at a random moment. The executions were told
+{told}{seeds}.{asked}</p>"""
 TOLD = {
     "known": "their start, goal and duration (task “known”)",
     "nominal": "their start; goal and duration are as learned (task “nominal”)",
@@ -90,9 +92,11 @@ def write_report(path: str | Path, evaluation: Evaluation, example: Example, com
 def _introduction(evaluation: Evaluation) -> str:
     experiment, n_classes = evaluation.experiment, evaluation.as_dict()["classes"]
     calibrated = any(judgement.calibrations for split in evaluation.by_seed.values() for judgement in split.values())
-    asked = f" The detector was asked for {percent(experiment.false_alarm_rate)} false alarms per execution." if calibrated else ""
+    asked = (
+        f" The detector was asked for {percent(experiment.false_alarm_rate)} false alarms per execution." if calibrated else ""
+    )
     return INTRODUCTION.format(
-        classes="A movement" if n_classes == 1 else f"{n_classes} movements",
+        classes="A movement was" if n_classes == 1 else f"{n_classes} movements were each",
         train=experiment.train,
         test=experiment.test,
         told=TOLD[experiment.task],
@@ -104,10 +108,9 @@ def _introduction(evaluation: Evaluation) -> str:
 def _rates(evaluation: Evaluation, summary: Summary) -> str:
     experiment, summaries = evaluation.experiment, evaluation.summaries()
     parts = ["<h2>False alarms and detected failures</h2>", comparison_table(evaluation, experiment.faults[0])]
-    for name, its in summaries.items():
-        if len(experiment.faults) > 1 or (name, its) == next(iter(summaries.items())):
-            title = f"<h3>{escape(name)}</h3>" if len(summaries) > 1 else ""
-            parts += [title, fault_tables(its)]
+    if len(experiment.faults) > 1 or experiment.faults[0] not in failures_of(summary):
+        for name, its in summaries.items():
+            parts += [f"<h3>{escape(name)}</h3>" if len(summaries) > 1 else "", fault_tables(its)]
     interval = INTERVALS.get(experiment.seeds, "by bootstrap over classes, where several splits reuse the recordings")
     has_paper = any(name.startswith(("predictive", "posterior")) for name in summaries)
     parts.append(RATES_NOTE.format(interval=interval, paper=PAPER_NOTE if has_paper else ""))
@@ -130,7 +133,8 @@ def _calibration(evaluation: Evaluation, name: str, realized: Sequence[RealizedR
 CALIBRATION_CAPTION = """α is per execution. <em>Attainable</em>: the least rate that n calibration executions can vouch for,
 1 / (n + 1). <em>Flagged</em>: movements with more calibration executions above the threshold than chance explains, and their
 share. Grey: where the realised rate lies in 95 % of splits if executions are exchangeable."""
-OPERATING_CAPTION = """Left: what is detected when the threshold is moved, against the false alarms it then raises. Right: the
+OPERATING_CAPTION = """Left: what is detected when the threshold is moved, against the false alarms it then raises; an
+alarm before the onset is a miss, so a curve may fall. Right: the
 share of “{fault}” detected within a time since the onset{several}."""
 WHEN_CAPTION = """Left: detection by the moment at which the failure begins. Right: from onset to alarm; the line goes from the
 10th to the 90th percentile, the dot is the median, the tick the 95th percentile."""

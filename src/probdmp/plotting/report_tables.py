@@ -17,16 +17,19 @@ NATURES: Sequence[tuple[str, tuple[str, str], Callable[[FaultSummary], Rate | No
 """Nature of faults, heads of the first two columns, what stands in the second."""
 
 
+LATENCY = "Latency, median / p95"
+
+
 def comparison_table(evaluation: Evaluation, fault: str) -> str:
     """A row for each judge, the published figures first."""
     rows = []
     for name, summary in {"the paper, as published": published_summary(), **evaluation.summaries()}.items():
         figures = summary.faults.get(fault)
-        of_fault = ["–"] * 3
+        of_fault = ["–"] * 4
         if figures is not None:
-            of_fault = [_rate(figures.detected), _rate(figures.ever), _latency(figures)]
+            of_fault = [_rate(figures.detected), _rate(figures.ever), _latency(figures), _kinds(figures)]
         rows.append([_named(name), _rate(summary.false_alarms), *of_fault])
-    heads = ("Judge", "False alarms", f"{fault}: alarm at or after the onset", f"{fault}: alarm at any time", "Latency, median / p95")
+    heads = ("Judge", "False alarms", f"{fault}: at or after the onset", f"{fault}: at any time", LATENCY, "Said to be")
     return _table(heads, rows)
 
 
@@ -40,7 +43,7 @@ def fault_tables(summary: Summary) -> str:
             if figures.nature == nature
         ]
         if rows:
-            tables.append(_table((*heads, "At any time", "Latency, median / p95", "Said to be"), rows))
+            tables.append(_table((*heads, "At any time", LATENCY, "Said to be"), rows))
     return "\n".join(tables)
 
 
@@ -81,8 +84,9 @@ def _named(name: str) -> str:
 
 
 def _kinds(figures: FaultSummary) -> str:
+    """What alarms were about, the most frequent first; nothing where the judge does not say."""
     kinds = sorted((figures.kinds or {}).items(), key=lambda item: -item[1])
-    return ", ".join(f"{name or 'not said'} {count}" for name, count in kinds) or "–"
+    return ", ".join(f"{name} {count}" for name, count in kinds if name) or "–"
 
 
 def _latency(figures: FaultSummary) -> str:
@@ -92,10 +96,17 @@ def _latency(figures: FaultSummary) -> str:
 
 
 def _rate(rate: Rate | None) -> str:
-    return "–" if rate is None else str(rate)
+    """Count and rate, and on a second line the interval."""
+    return "–" if rate is None else f"{rate.count}/{rate.n} {percent(rate.rate)}\n{100 * rate.low:.1f}–{percent(rate.high)}"
 
 
 def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     head = "".join(f"<th>{escape(text)}" for text in heads)
-    body = "\n".join("<tr>" + "".join(f"<td>{escape(cell)}" for cell in row) for row in rows)
+    body = "\n".join("<tr>" + "".join(f"<td>{_cell(cell)}" for cell in row) for row in rows)
     return f'<div class="wide"><table>\n<tr>{head}\n{body}\n</table></div>'
+
+
+def _cell(text: str) -> str:
+    """The first line, and smaller what stands below it."""
+    first, _, second = text.partition("\n")
+    return f"{escape(first)}<small>{escape(second)}</small>" if second else escape(first)
