@@ -8,7 +8,7 @@ from probdmp.detection.calibration import Calibration
 __all__ = ["REPORTED_RATES", "CalibrationFacts", "facts_of"]
 
 REPORTED_RATES = (0.01, 0.02, 0.05, 0.1)
-"""Rates of false alarms for which thresholds are told beside the one that was asked for."""
+"""Rates of false alarms that are reported on beside the one that was asked for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,11 +37,14 @@ class CalibrationFacts:
     """By rate: what the threshold would be if it were asked for."""
     suspects: Mapping[str, float]
     """Primitives with more calibration executions above the threshold than chance explains: label to their share."""
+    suspects_at: Mapping[float, Mapping[str, float]]
+    """By rate: which primitives would be suspects."""
 
 
 def facts_of(calibration: Calibration, task: str, label: str) -> CalibrationFacts:
     """The facts about a calibration; `task` and `label` as in `CalibrationFacts`."""
     c = calibration
+    others = {rate: Calibration(c.maxima, c.labels, rate, c.method) for rate in REPORTED_RATES}
     return CalibrationFacts(
         task=task,
         label=label,
@@ -52,6 +55,7 @@ def facts_of(calibration: Calibration, task: str, label: str) -> CalibrationFact
         method="conformal" if c.is_conformal else "tail",
         guarantee=c.guarantee,
         threshold=c.threshold,
-        thresholds={rate: Calibration(c.maxima, c.labels, rate, c.method).threshold for rate in REPORTED_RATES},
+        thresholds={rate: other.threshold for rate, other in others.items()},
         suspects=c.suspects,
+        suspects_at={rate: other.suspects for rate, other in others.items()},
     )

@@ -44,7 +44,7 @@ def plot_operating_curve(ax: "Axes", outcomes: Sequence[Outcome], summary: Summa
             ax.plot(*here, marker="o", color=series(k)["color"], clip_on=False)
     ax.set(xlabel="False alarms [% of executions]", ylabel="Detected [%]", xlim=(0, 100 * LARGEST_RATE))
     _from_a_round_number(ax)
-    ax.legend(loc="lower right", title="dots: as set")
+    _legend_beside(ax)
     return ax
 
 
@@ -74,7 +74,7 @@ def plot_by_onset(ax: "Axes", summary: Summary) -> "Axes":
             ax.plot(middles, shares, marker=".", label=fault, **series(k))
     ax.set(xlabel="Onset [% of the duration]", ylabel="Detected [%]", xlim=(30, 70))
     _from_a_round_number(ax)
-    ax.legend(loc="lower left")
+    _legend_beside(ax)
     return ax
 
 
@@ -118,3 +118,8 @@ def _from_a_round_number(ax: "Axes") -> None:
     heights = [np.asarray(line.get_ydata(), dtype=float) for line in ax.lines]
     lowest = min((float(np.nanmin(values)) for values in heights if values.size), default=0.0)
     ax.set_ylim(min(80.0, 20.0 * (lowest // 20)), 101)
+
+
+def _legend_beside(ax: "Axes") -> None:
+    """Where no line runs."""
+    ax.legend(loc="upper left", bbox_to_anchor=(1, 1))
