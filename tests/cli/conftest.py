@@ -69,7 +69,7 @@ def blocked(letters) -> list[Demonstration]:
 
 @pytest.fixture(scope="session")
 def folder(tmp_path_factory, letters, blocked) -> Path:
-    """Files: letters.npz, blocked.npz, unlabelled.npz; letters.probdmp, c.probdmp, bare.probdmp (no detector), paper.probdmp."""
+    """Files: letters.npz, blocked.npz, unlabelled.npz; letters, c, bare (without detector) and paper (its rule).probdmp."""
     place = tmp_path_factory.mktemp("cli")
     write_demonstrations(place / "letters.npz", letters)
     write_demonstrations(place / "blocked.npz", blocked)

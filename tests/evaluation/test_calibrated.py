@@ -9,7 +9,7 @@ import pytest
 from probdmp.demonstrations import synthetic_letters
 from probdmp.dmp import PUBLISHED, Configuration
 from probdmp.errors import InputError
-from probdmp.evaluation import UNDISTURBED, Experiment, at_level, evaluate, example_of, realized_rates
+from probdmp.evaluation import DETECTORS, READINGS, UNDISTURBED, Experiment, at_level, evaluate, example_of, realized_rates
 
 SMALL = Configuration(n_basis=8, weight_uncertainty="joint")
 FAULTS = ("hold", "slow", "wrong_class", "dropout", "stuck_sensor")
@@ -36,9 +36,10 @@ def outcomes(evaluation):
 
 
 def test_primitives_are_made_as_the_detector_needs_them():
-    assert Experiment().primitives_made == PUBLISHED
-    assert Experiment(detector="calibrated").primitives_made == Configuration(weight_uncertainty="joint")
-    assert Experiment(detector="calibrated", configuration=SMALL).primitives_made is SMALL
+    experiment = Experiment()
+    assert experiment.configuration_for("paper") == PUBLISHED
+    assert experiment.configuration_for("calibrated") == Configuration(weight_uncertainty="joint")
+    assert replace(experiment, configuration=SMALL).configuration_for("calibrated") is SMALL
 
 
 @pytest.mark.parametrize("rate", [0, 1, -0.1, float("nan")])
@@ -84,6 +85,14 @@ def test_a_higher_rate_is_the_lower_threshold_of_the_calibration(demos, experime
     same = [a.alarms[f] == b.alarms[f] for a, b in zip(moved, asked, strict=True) for f in ("hold", "slow", "wrong_class")]
     assert np.mean(same) > 0.85
     assert [one.nominal for one in realized_rates([evaluation.by_seed[0]["calibrated"]])] == [0.01, 0.02, 0.05, 0.1]
+
+
+def test_side_by_side_each_detector_has_its_own_primitives(demos, experiment, evaluation):
+    paper = {READINGS[0].name: DETECTORS["paper"][READINGS[0].name]}
+    chosen = replace(experiment, configuration=None, faults=("hold",), traces=False)
+    alone = evaluate(demos, replace(chosen, detector="paper"), paper)
+    both = evaluate(demos, chosen, {**DETECTORS["calibrated"], **paper})
+    assert both.outcomes[READINGS[0].name] == alone.outcomes[READINGS[0].name]
 
 
 def test_the_nominal_task_has_its_own_calibration(demos, experiment):

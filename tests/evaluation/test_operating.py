@@ -1,5 +1,7 @@
 """Thresholds that are moved afterwards, and the rates of false alarms that come about."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -55,7 +57,7 @@ def test_a_lower_level_is_never_later():
     rng = np.random.default_rng(0)
     outcomes = [outcome(rng.exponential(size=3), rng.exponential(size=3)) for _ in range(40)]
     alarms = [[o.alarms["hold"] for o in at_level(outcomes, level)] for level in (0.3, 1.0, 3.0)]
-    for sooner, later in zip(alarms, alarms[1:], strict=False):
+    for sooner, later in pairwise(alarms):
         assert all(b is None or (a is not None and a <= b) for a, b in zip(sooner, later, strict=True))
 
 

@@ -110,7 +110,9 @@ def _settings(given: Mapping[str, Any], published: bool) -> dict[str, Any]:
     if published and chosen.keys() & {"discretization", "scaling"}:
         raise UsageError("--published, or --discretization and --scaling", "both", "The paper's configuration decides these.")
     # Scaled by a goal that may not be told, the movement is not linear in what is unknown.
-    varied = {} if chosen.get("scaling") == "paper" else {"weight_model": "hierarchical", "weight_uncertainty": "joint"}
+    varied: dict[str, Any] = (
+        {} if chosen.get("scaling") == "paper" else {"weight_model": "hierarchical", "weight_uncertainty": "joint"}
+    )
     base = ProbabilisticDMP.as_published() if published else ProbabilisticDMP(**varied)
     settings = base.get_params() | chosen
     with usage():

@@ -45,12 +45,11 @@ class Experiment:
     traces: bool = False
     """Whether judges are asked to keep their statistic over time, for operating curves."""
 
-    @property
-    def primitives_made(self) -> Configuration:
-        """How primitives are made, whether that was given or not."""
+    def configuration_for(self, detector: str) -> Configuration:
+        """How primitives are made for a detector, whether that was given or not."""
         if self.configuration is not None:
             return self.configuration
-        return PUBLISHED if self.detector == "paper" else Configuration(weight_uncertainty="joint")
+        return PUBLISHED if detector == "paper" else Configuration(weight_uncertainty="joint")
 
     def __post_init__(self) -> None:
         for name in ("train", "test", "seeds"):

@@ -60,7 +60,7 @@ READINGS = tuple(
 
 def fit_paper_detector(trial: Trial, reading: Reading, experiment: Experiment) -> tuple[Primitive, FailureDetector]:
     """Learn a class from its training demonstrations, and the paper's detector with the task knowledge of the experiment."""
-    primitive = learned_primitive(trial, replace(experiment.primitives_made, forcing_noise=reading.forcing_noise))
+    primitive = learned_primitive(trial, replace(experiment.configuration_for("paper"), forcing_noise=reading.forcing_noise))
     detector = FailureDetector(rule="paper", likelihood=reading.likelihood)
     tasks = commanded_tasks(primitive, trial.training, experiment.task)
     return primitive, detector.fit(primitive, trial.training, tasks=tasks)
@@ -79,8 +79,13 @@ def _learned(training: tuple[Demonstration, ...], configuration: Configuration) 
 def shown_primitive(trial: Trial, experiment: Experiment) -> Primitive:
     """The primitive of a class as the first judge of the experiment has it, for pictures."""
     if experiment.detector == "paper":
-        return learned_primitive(trial, replace(experiment.primitives_made, forcing_noise=READINGS[0].forcing_noise))
-    return fit_primitive(trial.training, experiment.primitives_made, LearningOptions("hierarchical"))[0]
+        return learned_primitive(trial, replace(experiment.configuration_for("paper"), forcing_noise=READINGS[0].forcing_noise))
+    return _varied_primitive(trial, experiment)
+
+
+def _varied_primitive(trial: Trial, experiment: Experiment) -> Primitive:
+    configuration = experiment.configuration_for("calibrated")
+    return fit_primitive(trial.training, configuration, LearningOptions("hierarchical"))[0]
 
 
 def _judge_by_paper(reading: Reading, trials: Sequence[Trial], experiment: Experiment, on_class: Progress) -> Assessment:
@@ -101,8 +106,7 @@ def judge_by_calibrated(
     ----------
     parameters : of `FailureDetector`, to see what they do.
     """
-    options = LearningOptions("hierarchical")
-    primitives = {t.label: fit_primitive(t.training, experiment.primitives_made, options)[0] for t in trials}
+    primitives = {trial.label: _varied_primitive(trial, experiment) for trial in trials}
     detector = FailureDetector(experiment.false_alarm_rate, **parameters)  # type: ignore[arg-type]
     asked = {t.label: commanded_tasks(primitives[t.label], t.training, experiment.task) for t in trials}
     detector.fit(primitives, {trial.label: trial.training for trial in trials}, tasks=asked)

@@ -49,7 +49,9 @@ class Evaluation:
             "detector": experiment.detector,
             "task": experiment.task,
             "false_alarm_rate": experiment.false_alarm_rate if any(f["calibrations"] for f in figures) else None,
-            "configuration": {k: v for k, v in asdict(experiment.primitives_made).items() if k != "forcing_noise"},
+            "configuration": {
+                k: v for k, v in asdict(experiment.configuration_for(experiment.detector)).items() if k != "forcing_noise"
+            },
             "interval": CLOPPER_PEARSON if len(self.by_seed) == 1 else BOOTSTRAP,
             **figures[0],
             "readings": figures,

@@ -133,8 +133,8 @@ def _calibration(evaluation: Evaluation, name: str, realized: Sequence[RealizedR
 CALIBRATION_CAPTION = """α is per execution. <em>Attainable</em>: the least rate that n calibration executions can vouch for,
 1 / (n + 1). <em>Flagged</em>: movements with more calibration executions above the threshold than chance explains, and their
 share. Grey: where the realised rate lies in 95 % of splits if executions are exchangeable."""
-OPERATING_CAPTION = """Left: what is detected when the threshold is moved, against the false alarms it then raises (dots: as set);
-an alarm before the onset is a miss, so a curve may fall. Right: the
+OPERATING_CAPTION = """Left: what is detected when the threshold is moved, against the false alarms it then
+raises (dots: as set); an alarm before the onset is a miss, so a curve may fall. Right: the
 share of “{fault}” detected within a time since the onset{several}."""
 WHEN_CAPTION = """Left: detection by the moment at which the failure begins. Right: from onset to alarm; the line goes from the
 10th to the 90th percentile, the dot is the median, the tick the 95th percentile."""
