@@ -16,7 +16,7 @@ class CalibrationFacts:
     """One threshold: what was asked for, from how many executions it comes, how far it may be trusted."""
 
     task: str
-    """`"known"`: for executions that are told their goal and duration; `"nominal"`: for those that are told their start only."""
+    """`"known"`: for executions that are told their goal and duration; `"nominal"`: for those told their start only."""
     label: str
     """Of the primitive it is for; nothing for one that the whole library shares."""
     false_alarm_rate: float

@@ -66,7 +66,7 @@ class FailureDetector:
 
     def fit(
         self,
-        learned: Primitive | Learned | Mapping[str, Learned],
+        learned: Primitive | Learned | Mapping[str, Primitive | Learned],
         demonstrations: Recordings | Mapping[str, Recordings],
         dt: float | None = None,
         tasks: Sequence[Task] | Mapping[str, Sequence[Task]] | None = None,
