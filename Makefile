@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 
 BENCH := benchmarks/.venv
 
-.PHONY: demo test test-slow lint types figures results variation bench-env bench-detection clean
+.PHONY: demo test test-slow lint types figures results variation detection bench-env bench-detection clean
 
 demo: $(VENV)/.demo
 	$(BIN)/probdmp demo
@@ -34,6 +34,10 @@ results: $(VENV)/.demo
 # The table in docs/variation.md, from the same recordings; about ten minutes.
 variation: $(VENV)/.demo
 	$(BIN)/python docs/variation.py
+
+# The tables in docs/monitoring.md, from the same recordings; about a quarter of an hour.
+detection: $(VENV)/.demo
+	$(BIN)/python docs/detection.py
 
 # Peers that the library is compared with live in an environment of their own.
 bench-env: $(BENCH)/.ready

@@ -18,9 +18,21 @@ from rich.table import Table
 
 from baselines.judging import judge_by
 from baselines.method import Method
-from baselines.operating import at_level, level_realizing
 from probdmp import read_demonstrations
-from probdmp.evaluation import DETECTORS, TASKS, Evaluation, Experiment, FaultSummary, Judge, Rate, Summary, evaluate, summarize
+from probdmp.evaluation import (
+    DETECTORS,
+    TASKS,
+    Evaluation,
+    Experiment,
+    FaultSummary,
+    Judge,
+    Rate,
+    Summary,
+    at_level,
+    evaluate,
+    level_realizing,
+    summarize,
+)
 
 FAULTS = ("hold", "push", "push:0.4", "wrong_goal", "wrong_class", "slow")
 REALIZED = (0.01, 0.025, 0.05)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from probdmp import synthetic_letters
 from probdmp.evaluation import Experiment, illustrate
-from probdmp.plotting.report import draw_failure_detection
+from probdmp.plotting.failure_detection import draw_failure_detection
 from probdmp.plotting.style import figure_style
 
 IMAGES = Path(__file__).parent / "images"

@@ -15,7 +15,7 @@ from baselines.array_types import FloatArray
 from baselines.calibration import Standardization, threshold_for
 from baselines.method import Method
 from probdmp import Demonstration
-from probdmp.evaluation import Experiment, Finding, Judge, Outcome, Trace, Trial, outcomes_of
+from probdmp.evaluation import Assessment, Experiment, Finding, Judge, Outcome, Trace, Trial, outcomes_of
 from probdmp.evaluation.judges import Progress
 
 __all__ = ["judge_by"]
@@ -31,7 +31,7 @@ def judge_by(make: Callable[[], Method], alpha: float, jobs: int = 1) -> Judge:
     jobs : classes that are learned at the same time.
     """
 
-    def judge(trials: Sequence[Trial], experiment: Experiment, on_class: Progress) -> list[Outcome]:
+    def judge(trials: Sequence[Trial], experiment: Experiment, on_class: Progress) -> Assessment:
         tasks = (delayed(_raw_traces)(make, trial, experiment.task) for trial in trials)
         raw = []
         for trial, traces in zip(trials, Parallel(n_jobs=jobs, return_as="generator")(tasks), strict=True):
@@ -50,7 +50,7 @@ def judge_by(make: Callable[[], Method], alpha: float, jobs: int = 1) -> Judge:
                 for name, executions in trial.executions.items()
             }
             outcomes += outcomes_of(trial, findings)
-        return outcomes
+        return Assessment(outcomes)
 
     return judge
 

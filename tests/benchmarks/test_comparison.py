@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from baselines.calibration import Standardization, threshold_for
-from baselines.operating import at_level, level_realizing
 from probdmp import synthetic_letters
-from probdmp.evaluation import UNDISTURBED, Experiment, Finding, Outcome, Trace, evaluate
+from probdmp.evaluation import UNDISTURBED, Experiment, Finding, Outcome, Trace, at_level, evaluate, level_realizing
 
 
 @pytest.mark.parametrize(("n", "alpha", "rank"), [(99, 0.01, 99), (199, 0.01, 198), (19, 0.05, 19), (99, 0.05, 95)])

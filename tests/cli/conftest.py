@@ -15,6 +15,8 @@ from probdmp.cli import app
 from probdmp.demonstrations import Demonstration, hold
 
 N_BASIS = 8
+VARIED = {"n_basis": N_BASIS, "weight_model": "hierarchical", "weight_uncertainty": "joint"}
+"""How `probdmp fit --n-basis 8` learns."""
 
 
 def parse(text: str) -> Any:
@@ -67,15 +69,16 @@ def blocked(letters) -> list[Demonstration]:
 
 @pytest.fixture(scope="session")
 def folder(tmp_path_factory, letters, blocked) -> Path:
-    """Files: letters.npz, blocked.npz, unlabelled.npz; letters.probdmp, c.probdmp, bare.probdmp (no detector)."""
+    """Files: letters.npz, blocked.npz, unlabelled.npz; letters, c, bare (without detector) and paper (its rule).probdmp."""
     place = tmp_path_factory.mktemp("cli")
     write_demonstrations(place / "letters.npz", letters)
     write_demonstrations(place / "blocked.npz", blocked)
     by_label = {label: [d for d in letters if d.label == label] for label in "cl"}
     write_demonstrations(place / "unlabelled.npz", [replace(d, label="") for d in by_label["c"]])
-    library = PrimitiveLibrary.fit(by_label, n_basis=N_BASIS)
+    library = PrimitiveLibrary.fit(by_label, **VARIED)
     library.save(place / "letters.probdmp", FailureDetector().fit(library, by_label))
     library.save(place / "bare.probdmp")
-    alone = ProbabilisticDMP(n_basis=N_BASIS).fit(by_label["c"])
+    library.save(place / "paper.probdmp", FailureDetector(rule="paper").fit(library, by_label))
+    alone = ProbabilisticDMP(**VARIED).fit(by_label["c"])
     alone.save(place / "c.probdmp", FailureDetector().fit(alone, by_label["c"]))
     return place

@@ -1,5 +1,8 @@
 """`probdmp fit` and `probdmp inspect`."""
 
+import json
+from dataclasses import asdict
+
 import numpy as np
 import pytest
 from strategies import PAPERS_WEIGHTS
@@ -22,7 +25,9 @@ def test_fit_learns_what_the_library_learns(folder, run_json, tmp_path):
 def test_fit_reports_how_well(folder, run_json, tmp_path, letters):
     document = run_json("fit", folder / "letters.npz", "-o", tmp_path / "m.probdmp", "--label", "c", "--n-basis", 8)
     (summary,) = document["primitives"]
-    fitted = ProbabilisticDMP(8).fit([d for d in letters if d.label == "c"])
+    fitted = ProbabilisticDMP(8, weight_model="hierarchical", weight_uncertainty="joint").fit(
+        [d for d in letters if d.label == "c"]
+    )
     errors = fitted.fit_report_.reproduction_errors
     assert summary["demonstrations"] == 6
     assert summary["units"] == "mm"
@@ -116,11 +121,67 @@ def test_inspect_shows_everything(folder, run, run_json):
         primitive = reference[summary["label"]].primitive_
         assert summary["identity"] == primitive.identity
         assert summary["configuration"]["n_basis"] == 8
-        threshold = document["detector"]["thresholds"][summary["label"]]
-        assert threshold["minimum"] == detector.thresholds_[primitive.identity].minimum
+    told = document["detector"]
+    assert (told["rule"], told["false_alarm_rate"], told["statistic"]) == ("calibrated", 0.01, "trajectory")
+    assert told["calibrations"] == json.loads(json.dumps([asdict(facts) for facts in detector.calibrations_]))
+    assert [facts["task"] for facts in told["calibrations"]] == ["known", "nominal"]
     output = run("inspect", folder / "letters.probdmp").stdout
-    for words in ("8 basis functions", "exact", "scaling none", "predictive", "rule “paper”", "digest valid", "[mm]"):
+    for words in ("8 basis functions", "exact", "scaling none", "predictive", "rule “calibrated”", "digest valid", "[mm]"):
         assert words in output
+    for words in ("1 % false alarms per execution", "nominal", "7.69 %", "tail", "model-based, not guaranteed"):
+        assert words in output
+
+
+def test_inspect_shows_the_papers_thresholds(folder, run, run_json):
+    document, detector = run_json("inspect", folder / "paper.probdmp"), load_detector(folder / "paper.probdmp")
+    for summary in document["primitives"]:
+        threshold = document["detector"]["thresholds"][summary["label"]]
+        assert threshold["minimum"] == detector.thresholds_[summary["identity"]].minimum
+    assert "rule “paper”, log-likelihood per step" in run("inspect", folder / "paper.probdmp").stdout
+
+
+def test_fit_calibrates_the_detector_it_saves(folder, run, run_json, tmp_path):
+    arguments = ("fit", folder / "letters.npz", "-o", tmp_path / "m.probdmp", "--n-basis", 8, "--false-alarm-rate", 0.1)
+    told = run_json(*arguments)["detector"]
+    saved = load_detector(tmp_path / "m.probdmp")
+    assert (saved.rule, saved.false_alarm_rate) == (told["rule"], told["false_alarm_rate"]) == ("calibrated", 0.1)
+    assert told["calibrations"] == json.loads(json.dumps([asdict(facts) for facts in saved.calibrations_]))
+    output = run(*arguments).stdout
+    assert "With goal and duration told: 10 % false alarms per execution asked for, 7.69 % attainable with n = 12" in output
+    assert "With only the start told" in output
+    assert "empirical" in output
+
+
+def test_the_papers_rule_on_request(folder, run, tmp_path):
+    result = run("fit", folder / "letters.npz", "-o", tmp_path / "m.probdmp", "--n-basis", 8, "--rule", "paper")
+    assert (result.exit_code, load_detector(tmp_path / "m.probdmp").rule) == (0, "paper")
+    assert "false alarms" not in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--rule", "magic"), "--rule to be one of 'calibrated', 'paper', got 'magic'"),
+        (("--rule", "paper", "--false-alarm-rate", 0.1), "--false-alarm-rate with --rule calibrated"),
+        (("--false-alarm-rate", 1), "false_alarm_rate between 0 and 1"),
+        (("--published", "--rule", "calibrated"), "Use --rule paper"),
+    ],
+)
+def test_detectors_that_cannot_be_made(options, message, folder, run, tmp_path):
+    result = run("fit", folder / "letters.npz", "-o", tmp_path / "m.probdmp", *options)
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert message in result.stderr
+    assert not (tmp_path / "m.probdmp").exists()
+
+
+def test_too_few_demonstrations_to_calibrate_name_the_remedy(folder, run, tmp_path, letters):
+    write_demonstrations(tmp_path / "d.npz", [*letters[:1], *letters[-3:]])
+    arguments = ("fit", tmp_path / "d.npz", "-o", tmp_path / "m.probdmp", "--n-basis", 8)
+    result = run(*arguments)
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert "expected two or more demonstrations of everything, got one of 'c'" in result.stderr
+    assert "--rule paper" in result.stderr
+    assert run(*arguments, "--rule", "paper").exit_code == 0
 
 
 def test_inspect_of_a_model_without_detector(folder, run, run_json):

@@ -31,7 +31,20 @@ def test_verdicts_are_those_of_the_library(folder, run_json, blocked):
         assert execution["failed"] is verdict.failed
         assert execution["test_ratio"] == verdict.test_ratio
         assert (execution["time"], execution["step"], execution["phase"]) == (verdict.time, verdict.step, verdict.phase)
-        assert list(execution["contributions"].values()) == verdict.contributions.tolist()
+        assert execution["contributions"] == dict(zip("xy", verdict.contributions.tolist(), strict=True))
+        assert (execution["kind"], execution["cause"]) == (verdict.kind or None, verdict.cause or None)
+        assert (execution["channel"], execution["better"]) == (verdict.channel or None, verdict.better or None)
+        assert execution["is_stale"] is execution["has_sensor_fault"] is False
+        assert (execution["false_alarm_rate"], execution["guarantee"]) == (0.01, "model-based, not guaranteed")
+    assert {e["kind"] for e in document["executions"] if e["failed"]} == {"timing"}
+    assert document["detector"]["calibrations"][0]["n"] == 12
+
+
+def test_the_papers_rule_gives_no_reasons(folder, run, run_json):
+    document = json.loads(run("monitor", folder / "paper.probdmp", folder / "blocked.npz", "--json").stdout)
+    for execution in document["executions"]:
+        assert execution["kind"] is execution["guarantee"] is None
+    assert document["detector"]["rule"] == "paper"
 
 
 def test_fine_executions_give_exit_code_0(folder, run_json):
@@ -44,7 +57,10 @@ def test_a_readable_line_for_each_recording(folder, run, blocked):
     result = run("monitor", folder / "letters.probdmp", folder / "blocked.npz")
     verdicts = load_detector(folder / "letters.probdmp").verdicts(blocked)
     expected = [f"{d.label} {i}  {v}" for i, (d, v) in enumerate(zip(blocked, verdicts, strict=True))]
-    assert result.stdout.splitlines() == [*expected, "2 of 4 executions failed."]
+    *lines, count, calibration = result.stdout.splitlines()
+    assert (lines, count) == (expected, "2 of 4 executions failed.")
+    assert calibration.startswith("With only the start told: 1 % false alarms per execution asked for")
+    assert re.search(r"failed at \d\.\d+ s \(phase 0\.\d+\) \[timing: held\]: test ratio \d\.\d+, mostly [+−][xy]", lines[1])
     assert result.exit_code == 4
 
 
@@ -75,8 +91,13 @@ def test_json_lines_give_the_verdict_of_the_file(k, folder, run, run_json, block
     steps = answers(result)
     assert result.exit_code == (4 if file["failed"] else 0)
     assert [step["failed"] for step in steps] == [file["failed"] and t >= file["step"] for t in range(len(steps))]
-    decisive = steps[file["step"]]["test_ratio"]
-    assert decisive == pytest.approx(file["test_ratio"], rel=1e-9, abs=1e-9)
+    last = steps[-1]
+    assert (last["kind"], last["cause"], last["better"]) == (file["kind"], file["cause"], file["better"])
+    for step in steps:
+        assert (step["kind"] is not None) == step["failed"]
+        assert step["is_stale"] is step["has_sensor_fault"] is False
+    if file["failed"]:  # of the first of several moments that one sample completes
+        assert steps[file["step"]]["test_ratio"] > 1
 
 
 def test_json_lines_without_a_task_give_the_verdict_of_the_file(folder, run, run_json, letters, tmp_path):

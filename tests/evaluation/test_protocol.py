@@ -12,6 +12,7 @@ from probdmp.errors import InputError, InputTypeError
 from probdmp.evaluation import (
     DETECTORS,
     READINGS,
+    Assessment,
     Experiment,
     Finding,
     evaluate,
@@ -120,7 +121,7 @@ def early_judge(trials, experiment, on_class):
         }
         outcomes += outcomes_of(trial, findings)
         on_class(trial.label)
-    return outcomes
+    return Assessment(outcomes)
 
 
 def test_anyone_may_judge(demos, experiment):
@@ -148,7 +149,7 @@ def test_a_judge_sees_all_classes_of_a_seed_at_once(demos, experiment):
 
 def test_a_judge_that_forgets_some_is_refused(demos, experiment):
     with pytest.raises(InputError, match=r"from the judge 'lazy' an outcome for each of 6 test executions.*got 5"):
-        evaluate(demos, experiment, {"lazy": lambda *arguments: early_judge(*arguments)[1:]})
+        evaluate(demos, experiment, {"lazy": lambda *arguments: Assessment(early_judge(*arguments).outcomes[1:])})
 
 
 def test_what_judges_share_is_learned_once(demos, experiment):
@@ -255,7 +256,7 @@ def test_experiments_that_cannot_be_run(arguments, match):
 
 
 def test_detectors_that_do_not_exist(demos):
-    with pytest.raises(InputError, match="detector to be one of 'paper', got 'magic'"):
+    with pytest.raises(InputError, match="detector to be one of 'calibrated', 'paper', got 'magic'"):
         evaluate(demos, Experiment(3, 3, detector="magic"))
 
 

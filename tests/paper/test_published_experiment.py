@@ -45,7 +45,7 @@ def test_as_published_has_the_papers_choices():
         "goal_handling": "blend",  # of joint weights: without effect here
     }
     assert ProbabilisticDMP.as_published(forcing_noise="posterior").forcing_noise == "posterior"
-    assert replace(PUBLISHED, forcing_noise="predictive") == Experiment().configuration
+    assert replace(PUBLISHED, forcing_noise="predictive") == Experiment().configuration_for("paper")
     default = ProbabilisticDMP()
     assert (default.discretization, default.scaling) == ("exact", "none")
     assert (default.weight_model, default.weight_uncertainty) == ("hierarchical", "joint")

@@ -1,28 +1,36 @@
 """`probdmp evaluate`: the paper's experiment on any labelled demonstrations."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from shlex import join
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from probdmp.cli.detector_choice import DEFAULT_RATE, FalseAlarmRate
 from probdmp.cli.evaluation_table import print_evaluation
-from probdmp.cli.exit_codes import usage
-from probdmp.cli.options import Columns, Json, Seed, names_of
-from probdmp.cli.output import print_json
+from probdmp.cli.exit_codes import UsageError, usage
+from probdmp.cli.options import Columns, Json, Seed, check_output, names_of
+from probdmp.cli.output import print_json, print_line
 from probdmp.cli.progress import progress
 from probdmp.cli.recordings import read_files
 
 if TYPE_CHECKING:
     from probdmp.demonstrations import Demonstration
-    from probdmp.evaluation import Evaluation, Experiment
+    from probdmp.evaluation import Evaluation, Experiment, Judge
 
-__all__ = ["Test", "Train", "evaluate", "evaluation_of"]
+__all__ = ["Test", "Train", "evaluate", "evaluation_of", "write_evaluation"]
 
 Train = Annotated[int, typer.Option(metavar="N", help="Demonstrations per class that teach the primitive.")]
 FAULT_HELP = """What is injected, with commas between, or all. Failures: hold (blocked), hold_release (for a while), slow, push
 (aside and back), drift, wrong_goal, wrong_class. Benign: dropout, jitter. Sensor faults: stuck_sensor, spikes. push:0.4, and so
 drift and wrong_goal, go astray by 0.4 of the range."""
+WHY = {
+    "calibrated": "The calibrated detector has one way to make primitives.",
+    "paper": "The paper's rule takes no rate of false alarms.",
+}
+"""By detector: why an option of the other is refused."""
 Test = Annotated[int, typer.Option(metavar="N", help="Other demonstrations per class that are judged.")]
 
 
@@ -33,15 +41,27 @@ def evaluate(
     test: Test = 10,
     seed: Seed = 0,
     seeds: Annotated[int, typer.Option(metavar="N", help="Splits, with the seeds S, S + 1, …; figures are pooled.")] = 1,
-    detector: Annotated[str, typer.Option(metavar="NAME", help="paper: the paper's rule, in all its readings.")] = "paper",
+    detector: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME", help="calibrated: for a rate of false alarms; paper: the paper's rule, in all its readings."
+        ),
+    ] = "calibrated",
+    false_alarm_rate: FalseAlarmRate = None,
     fault: Annotated[str, typer.Option(metavar="NAMES", help=FAULT_HELP)] = "hold",
     task: Annotated[
         str,
         typer.Option(metavar="NAME", help="known: start, goal and duration are commanded; nominal: only the start is."),
     ] = "known",
     configuration: Annotated[
-        str, typer.Option(metavar="NAME", help="published: the paper's; default: the library's.")
-    ] = "published",
+        str | None,
+        typer.Option(
+            metavar="NAME", help="Of paper: how primitives are made. published (the default) or default: the library's."
+        ),
+    ] = None,
+    report: Annotated[
+        Path | None, typer.Option("--report", metavar="FILE.html", help="Write a page with tables and figures.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Measure false alarms and detected failures, as the paper does.
@@ -50,29 +70,87 @@ def evaluate(
     in 30 to 70 % of the movement. Rates come with 95 % intervals, exact for one split and by bootstrap over classes for
     several; latencies are fractions of the duration.
     """
-    from probdmp.checks import check_choice
-    from probdmp.dmp import PUBLISHED, Configuration
-    from probdmp.evaluation import DETECTORS, Experiment
-
-    configurations = {"published": PUBLISHED, "default": Configuration()}
+    check_output(report, ".html")
     with usage():
-        chosen = configurations[check_choice(configuration, "configuration", configurations)]
-        check_choice(detector, "detector", DETECTORS)
-        experiment = Experiment(train, test, seed, detector, task, _faults(fault), chosen, seeds)
-    result = evaluation_of(read_files([file], names_of(columns)), experiment)
+        experiment = _experiment(
+            detector,
+            false_alarm_rate,
+            configuration,
+            {"train": train, "test": test, "seed": seed, "seeds": seeds, "task": task, "faults": _faults(fault)},
+        )
+    if report is not None:
+        from probdmp.plotting.style import require_matplotlib
+
+        require_matplotlib()
+        experiment = replace(experiment, traces=True)
+    demonstrations = read_files([file], names_of(columns))
+    result = evaluation_of(demonstrations, experiment)
     if as_json:
         print_json(result.as_dict())
     else:
         print_evaluation(result)
+    if report is not None:
+        write_evaluation(report, result, demonstrations, _command(file, columns, experiment, configuration))
+        if not as_json:
+            print_line(f"Report: {report}")
 
 
-def evaluation_of(demonstrations: Sequence["Demonstration"], experiment: "Experiment") -> "Evaluation":
-    """Run an experiment with a progress bar."""
+def _experiment(
+    detector: str, false_alarm_rate: float | None, configuration: str | None, given: Mapping[str, Any]
+) -> "Experiment":
+    """What was asked for; options of the other detector are refused."""
+    from probdmp.checks import check_choice
+    from probdmp.dmp import PUBLISHED, Configuration
+    from probdmp.evaluation import DETECTORS, Experiment
+
+    check_choice(detector, "detector", DETECTORS)
+    others = {"calibrated": ("--configuration", configuration), "paper": ("--false-alarm-rate", false_alarm_rate)}
+    option, value = others[detector]
+    if value is not None:
+        raise UsageError(f"{option} with the other detector only", f"it with --detector {detector}", WHY[detector])
+    chosen = None
+    if configuration is not None:
+        configurations = {"published": PUBLISHED, "default": Configuration()}
+        chosen = configurations[check_choice(configuration, "configuration", configurations)]
+    rate = DEFAULT_RATE if false_alarm_rate is None else false_alarm_rate
+    return Experiment(**given, detector=detector, configuration=chosen, false_alarm_rate=rate)
+
+
+def evaluation_of(
+    demonstrations: Sequence["Demonstration"], experiment: "Experiment", judges: "Mapping[str, Judge] | None" = None
+) -> "Evaluation":
+    """Run an experiment with a progress bar; the judges are those of its detector unless given."""
     from probdmp.evaluation import DETECTORS, evaluate
 
+    chosen = DETECTORS[experiment.detector] if judges is None else judges
     n_classes = len({demonstration.label for demonstration in demonstrations})
-    with progress("Evaluating", n_classes * experiment.seeds * len(DETECTORS[experiment.detector])) as done:
-        return evaluate(demonstrations, experiment, on_class=done)
+    with progress("Evaluating", n_classes * experiment.seeds * len(chosen)) as done:
+        return evaluate(demonstrations, experiment, chosen, on_class=done)
+
+
+def write_evaluation(path: Path, result: "Evaluation", demonstrations: Sequence["Demonstration"], command: str) -> None:
+    """Write the report.
+
+    Raises
+    ------
+    MissingExtraError
+        If what draws it is not installed.
+    """
+    from probdmp.evaluation import example_of
+    from probdmp.plotting.report import write_report
+
+    write_report(path, result, example_of(result, demonstrations), command)
+
+
+def _command(file: Path, columns: str | None, experiment: "Experiment", configuration: str | None) -> str:
+    """What to type to get the same figures."""
+    words = ["probdmp", "evaluate", str(file), *(["--columns", columns] if columns is not None else [])]
+    for name in ("train", "test", "seed", "seeds", "detector", "task"):
+        words += [f"--{name}", str(getattr(experiment, name))]
+    words += ["--fault", ",".join(experiment.faults)]
+    if experiment.detector == "calibrated":
+        words += ["--false-alarm-rate", f"{experiment.false_alarm_rate:g}"]
+    return join([*words, *(["--configuration", configuration] if configuration is not None else [])])
 
 
 def _faults(text: str) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+from probdmp.cli.detector_summaries import calibration_text
 from probdmp.cli.output import print_line, print_table
 
 if TYPE_CHECKING:
@@ -15,6 +16,7 @@ NOTES = (
     "Detected: first alarm at or after the onset of the fault. Ever: at any time, the paper's count.",
     "Latency: from onset to alarm, % of the duration, median and 95th percentile.",
 )
+TOLD_APART = {"hold": "hold called held", "slow": "slow not called held"}
 INTERVALS = {
     "clopper_pearson": "Intervals: 95 %, exact (Clopper-Pearson).",
     "bootstrap_over_classes": "Intervals: 95 %, bootstrap over classes.",
@@ -33,6 +35,7 @@ def print_evaluation(evaluation: "Evaluation") -> None:
         f"detector {experiment.detector}, task {experiment.task}, {configuration['discretization']}, "
         f"scaling {configuration['scaling']}"
     )
+    _print_calibrations(evaluation)
     summaries = evaluation.summaries()
     if len(experiment.faults) == 1:
         _print_judges(summaries, experiment.faults[0])
@@ -41,6 +44,14 @@ def print_evaluation(evaluation: "Evaluation") -> None:
             _print_faults(name, summary)
     for note in (INTERVALS[document["interval"]], *NOTES):
         print_line(note, style="dim")
+
+
+def _print_calibrations(evaluation: "Evaluation") -> None:
+    """Where thresholds come from: a line for each judge and seed that has one."""
+    for seed, split in evaluation.by_seed.items():
+        for assessment in split.values():
+            for facts in assessment.calibrations:
+                print_line((f"seed {seed}: " if len(evaluation.by_seed) > 1 else "") + calibration_text(facts))
 
 
 def _print_judges(summaries: dict[str, "Summary"], fault: str) -> None:
@@ -54,6 +65,8 @@ def _print_judges(summaries: dict[str, "Summary"], fault: str) -> None:
         rows.append([name.replace(", ", "\n", 1), _rate(summary.false_alarms), *of_fault])
     columns = ["judge", "false alarms", "detected", "ever failed", "latency"]
     print_table(columns, rows, title=f"Fault: {fault}", second_lines="dim")
+    for name, summary in summaries.items():
+        _print_told_apart(summary, name)
 
 
 def _print_faults(name: str, summary: "Summary") -> None:
@@ -71,6 +84,14 @@ def _print_faults(name: str, summary: "Summary") -> None:
         ]
         if rows:
             print_table([*title, "95 %", "ever", "latency", "p95"], rows)
+    _print_told_apart(summary)
+
+
+def _print_told_apart(summary: "Summary", judge: str = "") -> None:
+    rates = {fault: figures.told_apart for fault, figures in summary.faults.items()}
+    texts = [f"{TOLD_APART[fault]} {_count(rate)}" for fault, rate in rates.items() if rate is not None]
+    if texts:
+        print_line(f"Of those detected{f' by {judge}' if judge else ''}: {'; '.join(texts)}.")
 
 
 TABLES: Sequence[tuple[str, tuple[str, str], Callable[["FaultSummary"], "Rate | None"]]] = (

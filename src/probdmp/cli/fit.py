@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from probdmp.cli.detector_choice import FalseAlarmRate, Rule, calibrate, chosen_detector
+from probdmp.cli.detector_summaries import calibration_text, detector_summary
 from probdmp.cli.exit_codes import UsageError, usage
 from probdmp.cli.options import Columns, Json, check_output, names_of
 from probdmp.cli.output import print_json, print_line, print_table
@@ -84,31 +86,36 @@ def fit(
             help="The paper's configuration: semi_implicit_euler, its scaling, pooled and independent weights.",
         ),
     ] = False,
+    rule: Rule = None,
+    false_alarm_rate: FalseAlarmRate = None,
     as_json: Json = False,
 ) -> None:
     """Learn primitives and their failure detector from demonstrations.
 
-    One primitive for each label in the files; without labels, or with --label, a single one. The paper's failure detector
-    is fitted to the same demonstrations and saved with them, so that probdmp monitor can judge executions.
+    One primitive for each label in the files; without labels, or with --label, a single one. The failure detector is
+    calibrated on the same demonstrations, each judged by what the others teach, and saved with the primitives, so that probdmp
+    monitor can judge executions.
     """
     check_output(output, ".probdmp")
     given = {"forcing_noise": forcing_noise, "discretization": discretization, "scaling": scaling}
     given |= {"weight_model": weight_model, "weight_uncertainty": weight_uncertainty}
     settings = _settings({"n_basis": n_basis, "smoothing": smoothing, **given}, published)
-    from probdmp.detection import FailureDetector
+    detector = chosen_detector(rule, false_alarm_rate, settings)
     from probdmp.estimator import PrimitiveLibrary
     from probdmp.evaluation import group_by_label
 
     demonstrations = group_by_label(read_files(files, names_of(columns), label))
     library = PrimitiveLibrary(_learn(demonstrations, settings))
-    detector = FailureDetector().fit(library, demonstrations)
+    calibrate(detector, library, demonstrations)
     with usage():
         library.save(output, detector)
     summaries = [_summary(name, learned) for name, learned in library.items()]
     if as_json:
-        print_json({"model": str(output), "primitives": summaries, "detector": detector.rule})
+        print_json({"model": str(output), "primitives": summaries, "detector": detector_summary(detector)})
     else:
         _print_summaries(summaries)
+        for facts in detector.calibrations_:
+            print_line(calibration_text(facts))
         print_line(f"Wrote {output}, with a failure detector (rule “{detector.rule}”).")
 
 

@@ -1,9 +1,9 @@
 """`probdmp inspect`: what a model file holds."""
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from probdmp.cli.detector_summaries import detector_summary, print_detector
 from probdmp.cli.options import Json, ModelFile
 from probdmp.cli.output import print_json, print_line, print_table
 from probdmp.cli.summaries import by_name, common_units, name_text, primitive_summary
@@ -47,17 +47,7 @@ def _document(model: Path, contents: "ModelContents", detector: "FailureDetector
             {**primitive_summary(label, primitive), "settings": contents.settings.get(label), "identity": primitive.identity}
             for label, primitive in contents.primitives.items()
         ],
-        "detector": None if detector is None else _detector_summary(detector),
-    }
-
-
-def _detector_summary(detector: "FailureDetector") -> dict[str, Any]:
-    """Thresholds by label, nats: the least log-likelihood in training and the level below which an execution has failed."""
-    thresholds = {label: detector.thresholds_[primitive.identity] for label, primitive in detector.primitives_.items()}
-    return {
-        "rule": detector.rule,
-        "likelihood": detector.likelihood,
-        "thresholds": {label: {**asdict(t), "level": t.level} for label, t in thresholds.items()},
+        "detector": None if detector is None else detector_summary(detector),
     }
 
 
@@ -93,11 +83,7 @@ def _print_document(document: dict[str, Any]) -> None:
     if detector is None:
         print_line("No failure detector.")
         return
-    print_line(f"Failure detector: rule “{detector['rule']}”, log-likelihood {detector['likelihood'].replace('_', ' ')}.")
-    print_table(
-        ["primitive", "least in training [nats]", "failed below [nats]"],
-        [[name_text(label), f"{t['minimum']:.2f}", f"{t['level']:.2f}"] for label, t in detector["thresholds"].items()],
-    )
+    print_detector(detector)
 
 
 def _configuration_text(primitive: dict[str, Any]) -> str:

@@ -2,10 +2,11 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from probdmp.cli.detector_summaries import calibration_text, detector_summary, verdict_summary
 from probdmp.cli.exit_codes import FAILURE_DETECTED, UsageError, usage
 from probdmp.cli.options import Duration, Goal, Json, Label, ModelFile, Start, StartVelocity, TaskOptions
 from probdmp.cli.output import print_json, print_line
@@ -54,7 +55,8 @@ def monitor(
     First, perhaps: {"task": {"start": [0, 0], "goal": [1, 2], "duration": 1.2, "dt": 0.01, "label": "a"}}, any of these.
     Unless given, the start is the first position and the rest is as learned.
 
-    Out: time, position, velocity, acceleration, log_likelihood (nats), test_ratio (above 1: alarm), failed.
+    Out: time, position, velocity, acceleration, log_likelihood (nats), test_ratio (above 1: alarm), failed; kind and cause
+    of the failure and a primitive that fits better, null until there is one; is_stale, has_sensor_fault.
     """
     from probdmp.checks import check_choice, check_seconds
     from probdmp.estimator import PrimitiveLibrary, load_detector
@@ -84,33 +86,27 @@ def _monitor_file(
     from probdmp.dmp import task_for
 
     recordings = read_executions(path, library, label)
-    asked = []
+    asked, facts = [], []
     for recording in recordings:
         primitive = primitive_of(library, recording)[1].primitive_
         given = task.arguments(primitive)
         given["start"] = recording.positions[0] if given["start"] is None else given["start"]
         asked.append(task_for(primitive, **given))
+        facts.append(detector.calibration_for(primitive, asked[-1]))
     labels = [recording.label for recording in recordings]
     verdicts = detector.verdicts(recordings, tasks=asked)
     if as_json:
-        executions = [_as_dict(*judged) for judged in zip(labels, range(len(labels)), verdicts, strict=True)]
-        print_json({"executions": executions, "failed": sum(verdict.failed for verdict in verdicts)})
+        executions = [
+            {"label": label, "index": index, **verdict_summary(verdict, its)}
+            for index, (label, verdict, its) in enumerate(zip(labels, verdicts, facts, strict=True))
+        ]
+        count = sum(verdict.failed for verdict in verdicts)
+        print_json({"executions": executions, "failed": count, "detector": detector_summary(detector)})
     else:
         _print_verdicts(labels, verdicts)
+        for text in {calibration_text(its): None for its in facts if its is not None}:
+            print_line(text, style="dim")
     return any(verdict.failed for verdict in verdicts)
-
-
-def _as_dict(label: str, index: int, verdict: "Verdict") -> dict[str, Any]:
-    return {
-        "label": label,
-        "index": index,
-        "failed": verdict.failed,
-        "time": verdict.time,
-        "phase": verdict.phase,
-        "step": verdict.step,
-        "test_ratio": verdict.test_ratio,
-        "contributions": dict(zip(verdict.names, verdict.contributions, strict=True)),
-    }
 
 
 def _print_verdicts(labels: Sequence[str], verdicts: "Sequence[Verdict]") -> None:

@@ -8,8 +8,12 @@ __all__ = ["progress"]
 
 
 @contextmanager
-def progress(what: str, total: int) -> Iterator[Callable[[str], None]]:
+def progress(what: str, total: int | None) -> Iterator[Callable[[str], None]]:
     """A bar while the block runs; silent when standard error is not a terminal.
+
+    Parameters
+    ----------
+    total : parts; None where it is not known how far the work has come.
 
     Yields
     ------

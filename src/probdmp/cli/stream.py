@@ -61,11 +61,21 @@ def monitor_stream(library: "PrimitiveLibrary", detector: "FailureDetector", opt
             step = execution.step(position, time)
         answer = {name: getattr(step, name) for name in ("time", "position", "velocity", "acceleration")}
         answer |= {"log_likelihood": step.log_likelihood, "test_ratio": step.test_ratio, "failed": execution.failed}
-        sys.stdout.write(json_line(answer))
+        sys.stdout.write(json_line(answer | _reason(execution)))
         sys.stdout.flush()
     if execution is None:
         raise DataFileError("at least one tick on standard input", "none", HINT)
     return execution.failed
+
+
+def _reason(execution: "OnlineExecution") -> dict[str, Any]:
+    """What is said of a failure, None as long as there is none; it may change while the execution goes on."""
+    from probdmp.detection import Verdict
+
+    verdict = execution.verdict
+    assert isinstance(verdict, Verdict), "a FailureDetector is watching"
+    reason = {name: getattr(verdict, name) or None for name in ("kind", "cause", "better")}
+    return {**reason, "is_stale": verdict.is_stale, "has_sensor_fault": verdict.has_sensor_fault}
 
 
 def _prepare(

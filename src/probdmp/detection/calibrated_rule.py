@@ -7,6 +7,7 @@ calibration for each. Unless tasks are given, both are made, from demonstrations
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, fields
+from functools import cached_property
 from os import cpu_count
 from typing import Any, Protocol, Self
 
@@ -16,6 +17,7 @@ from probdmp.checks import FloatArray, check_array
 from probdmp.demonstrations import Demonstration
 from probdmp.detection.calibrated_monitor import CalibratedMonitor
 from probdmp.detection.calibration import Calibration
+from probdmp.detection.calibration_facts import CalibrationFacts, facts_of
 from probdmp.detection.innovation_family import InnovationFamily
 from probdmp.detection.library import Library, Member, own_tasks
 from probdmp.detection.options import DetectorOptions
@@ -98,6 +100,15 @@ class CalibratedRule:
                 "Fit it without tasks, for both, or give the tasks that executions will have.",
             )
         return by_label[POOLED if self.options.pooled else self._labels[primitive.identity]]
+
+    @cached_property
+    def facts(self) -> tuple[CalibrationFacts, ...]:
+        """Of every calibration."""
+        return tuple(
+            facts_of(calibration, MODES[knows_goal], label)
+            for knows_goal, by_label in self.calibrations.items()
+            for label, calibration in by_label.items()
+        )
 
     def monitor(self, primitive: Primitive, task: Task, dt: float) -> CalibratedMonitor:
         """A fresh judge for one execution."""

@@ -10,10 +10,13 @@ from probdmp.checks import check_choice
 from probdmp.demonstrations import Demonstration, Recordings, as_demonstrations
 from probdmp.detection.calibrated_monitor import CalibratedMonitor
 from probdmp.detection.calibrated_rule import CalibratedRule
+from probdmp.detection.calibration_facts import CalibrationFacts
 from probdmp.detection.library import Learned, Library, own_tasks
 from probdmp.detection.monitoring import LikelihoodMonitor
 from probdmp.detection.options import DetectorOptions
 from probdmp.detection.paper_rule import PaperRule
+from probdmp.detection.thresholds import PaperThreshold
+from probdmp.detection.trajectory_family import tells_goal
 from probdmp.detection.verdict import Verdict
 from probdmp.dmp import Primitive, Task
 from probdmp.errors import InputError, InputTypeError, NotFittedError
@@ -63,7 +66,7 @@ class FailureDetector:
 
     def fit(
         self,
-        learned: Primitive | Learned | Mapping[str, Learned],
+        learned: Primitive | Learned | Mapping[str, Primitive | Learned],
         demonstrations: Recordings | Mapping[str, Recordings],
         dt: float | None = None,
         tasks: Sequence[Task] | Mapping[str, Sequence[Task]] | None = None,
@@ -90,6 +93,24 @@ class FailureDetector:
         # Together, and only now: a fit that fails leaves the detector as it was.
         self.rule_, self.primitives_ = rule, {label: member.primitive for label, member in library.members.items()}
         return self
+
+    @property
+    def calibrations_(self) -> tuple[CalibrationFacts, ...]:
+        """Each threshold, where it comes from and how far it may be trusted; none with the paper's rule."""
+        rule = self._fitted()
+        return rule.facts if isinstance(rule, CalibratedRule) else ()
+
+    @property
+    def thresholds_(self) -> Mapping[str, PaperThreshold]:
+        """With the paper's rule, that of each primitive by its identity; none where it is calibrated."""
+        rule = self._fitted()
+        return rule.thresholds if isinstance(rule, PaperRule) else {}
+
+    def calibration_for(self, primitive: Primitive, task: Task) -> CalibrationFacts | None:
+        """That of one execution; None with the paper's rule."""
+        label = "" if self.pooled else next(name for name, p in self.primitives_.items() if p.identity == primitive.identity)
+        known = "known" if tells_goal(task) else "nominal"
+        return next((facts for facts in self.calibrations_ if (facts.task, facts.label) == (known, label)), None)
 
     def monitor(self, primitive: Primitive, task: Task, dt: float) -> CalibratedMonitor | LikelihoodMonitor:
         """A fresh judge for one execution of a primitive, which the detector must have been fitted to."""

@@ -44,7 +44,7 @@ class Library:
     @classmethod
     def of(
         cls,
-        learned: Primitive | Learned | Mapping[str, Learned],
+        learned: Primitive | Learned | Mapping[str, Primitive | Learned],
         demonstrations: Recordings | Mapping[str, Recordings],
         dt: float | None,
         tasks: Sequence[Task] | Mapping[str, Sequence[Task]] | None,

@@ -1,10 +1,12 @@
 """The paper's experiment on any labelled demonstrations: protocol, judges, rates with intervals, latency."""
 
+from probdmp.evaluation.example import Example, example_of
 from probdmp.evaluation.experiment import TASKS, Experiment
 from probdmp.evaluation.illustration import Illustration, illustrate
 from probdmp.evaluation.judges import DETECTORS, READINGS, Judge, Reading, learned_primitive
 from probdmp.evaluation.metrics import Rate, rate_of
-from probdmp.evaluation.outcomes import Finding, Outcome, Trace, outcomes_of
+from probdmp.evaluation.operating import RealizedRate, at_level, detected_within, level_realizing, realized_rates
+from probdmp.evaluation.outcomes import Assessment, Finding, Outcome, Trace, outcomes_of
 from probdmp.evaluation.protocol import Evaluation, evaluate
 from probdmp.evaluation.summary import FaultSummary, Summary, published_summary, summarize
 from probdmp.evaluation.trials import UNDISTURBED, Trial, commanded_tasks, draw_trials, group_by_label
@@ -14,7 +16,9 @@ __all__ = [
     "READINGS",
     "TASKS",
     "UNDISTURBED",
+    "Assessment",
     "Evaluation",
+    "Example",
     "Experiment",
     "FaultSummary",
     "Finding",
@@ -23,17 +27,23 @@ __all__ = [
     "Outcome",
     "Rate",
     "Reading",
+    "RealizedRate",
     "Summary",
     "Trace",
     "Trial",
+    "at_level",
     "commanded_tasks",
+    "detected_within",
     "draw_trials",
     "evaluate",
+    "example_of",
     "group_by_label",
     "illustrate",
     "learned_primitive",
+    "level_realizing",
     "outcomes_of",
     "published_summary",
     "rate_of",
+    "realized_rates",
     "summarize",
 ]

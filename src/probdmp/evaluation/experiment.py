@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from probdmp.checks import check_choice, check_count
 from probdmp.demonstrations import fault_named
+from probdmp.detection.options import DetectorOptions
 from probdmp.dmp import PUBLISHED, Configuration
 from probdmp.errors import InputTypeError
 
@@ -34,8 +35,9 @@ class Experiment:
     and duration are as learned. Thresholds are learned with the same knowledge."""
     faults: tuple[str, ...] = ("hold",)
     """Names of faults, some with a size, such as `"push:0.4"`; see `probdmp.demonstrations.fault_named`."""
-    configuration: Configuration = PUBLISHED
-    """How primitives are made; the paper's unless given. Readings of the paper's rule set the forcing noise themselves."""
+    configuration: Configuration | None = None
+    """How primitives are made. Unless given, as published for the paper's detector and as the library does for others. Readings
+    of the paper's rule set the forcing noise themselves; the calibrated detector learns how executions vary in any case."""
     false_alarm_rate: float = 0.01
     """What a calibrated detector is asked for, as a share of normal executions."""
     seeds: int = 1
@@ -43,10 +45,17 @@ class Experiment:
     traces: bool = False
     """Whether judges are asked to keep their statistic over time, for operating curves."""
 
+    def configuration_for(self, detector: str) -> Configuration:
+        """How primitives are made for a detector, whether that was given or not."""
+        if self.configuration is not None:
+            return self.configuration
+        return PUBLISHED if detector == "paper" else Configuration(weight_uncertainty="joint")
+
     def __post_init__(self) -> None:
         for name in ("train", "test", "seeds"):
             check_count(getattr(self, name), name)
         check_count(self.seed, "seed", least=0)
+        DetectorOptions(self.false_alarm_rate)
         check_choice(self.task, "task", TASKS)
         if isinstance(self.faults, str):
             raise InputTypeError("faults as a tuple of names", repr(self.faults), f"A single one: ({self.faults!r},).")

@@ -73,7 +73,7 @@ def illustrate(demonstrations: Sequence[Demonstration], experiment: Experiment, 
         disturbed=pairs[k][1],
         fault=fault,
         onset=trial.onsets[fault][k] * trial.tests[k].dt,
-        level=detector.paper_level(primitive),
+        level=detector.thresholds_[primitive.identity].level,
     )
 
 

@@ -1,8 +1,8 @@
 """Who decides whether an execution has failed.
 
 A judge is given the trials of all classes at once, so that it may learn from the training demonstrations of all of them, and
-returns an outcome for each test execution, trial by trial. It sees no test demonstration before it has made up its mind how to
-judge. `outcomes_of` puts its findings together.
+returns an assessment: an outcome for each test execution, trial by trial, and where its thresholds come from. It sees no test
+demonstration before it has made up its mind how to judge. `outcomes_of` puts its findings together.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -15,7 +15,7 @@ from probdmp.demonstrations import Demonstration
 from probdmp.detection import FailureDetector
 from probdmp.dmp import Configuration, Primitive, Task
 from probdmp.evaluation.experiment import Experiment
-from probdmp.evaluation.outcomes import Finding, Outcome, Trace, outcomes_of
+from probdmp.evaluation.outcomes import Assessment, Finding, Outcome, Trace, outcomes_of
 from probdmp.evaluation.trials import Trial, commanded_tasks
 from probdmp.learning import LearningOptions, fit_primitive
 
@@ -28,11 +28,12 @@ __all__ = [
     "fit_paper_detector",
     "judge_by_calibrated",
     "learned_primitive",
+    "shown_primitive",
 ]
 
 Progress = Callable[[str], None]
 """Called by a judge with its label after each class."""
-Judge = Callable[[Sequence[Trial], Experiment, Progress], list[Outcome]]
+Judge = Callable[[Sequence[Trial], Experiment, Progress], Assessment]
 """(trials of one seed, the experiment with that seed, progress) to one outcome for each test, in the order of the trials."""
 
 
@@ -59,7 +60,7 @@ READINGS = tuple(
 
 def fit_paper_detector(trial: Trial, reading: Reading, experiment: Experiment) -> tuple[Primitive, FailureDetector]:
     """Learn a class from its training demonstrations, and the paper's detector with the task knowledge of the experiment."""
-    primitive = learned_primitive(trial, replace(experiment.configuration, forcing_noise=reading.forcing_noise))
+    primitive = learned_primitive(trial, replace(experiment.configuration_for("paper"), forcing_noise=reading.forcing_noise))
     detector = FailureDetector(rule="paper", likelihood=reading.likelihood)
     tasks = commanded_tasks(primitive, trial.training, experiment.task)
     return primitive, detector.fit(primitive, trial.training, tasks=tasks)
@@ -75,46 +76,54 @@ def _learned(training: tuple[Demonstration, ...], configuration: Configuration) 
     return fit_primitive(training, configuration, LearningOptions())[0]
 
 
-def _judge_by_paper(reading: Reading, trials: Sequence[Trial], experiment: Experiment, on_class: Progress) -> list[Outcome]:
+def shown_primitive(trial: Trial, experiment: Experiment) -> Primitive:
+    """The primitive of a class as the first judge of the experiment has it, for pictures."""
+    if experiment.detector == "paper":
+        return learned_primitive(trial, replace(experiment.configuration_for("paper"), forcing_noise=READINGS[0].forcing_noise))
+    return _varied_primitive(trial, experiment)
+
+
+def _varied_primitive(trial: Trial, experiment: Experiment) -> Primitive:
+    configuration = experiment.configuration_for("calibrated")
+    return fit_primitive(trial.training, configuration, LearningOptions("hierarchical"))[0]
+
+
+def _judge_by_paper(reading: Reading, trials: Sequence[Trial], experiment: Experiment, on_class: Progress) -> Assessment:
     outcomes: list[Outcome] = []
     for trial in trials:
         primitive, detector = fit_paper_detector(trial, reading, experiment)
-        tasks = commanded_tasks(primitive, trial.tests, experiment.task)
-        findings = {
-            name: _findings(detector, primitive, tasks, executions, experiment.traces)
-            for name, executions in trial.executions.items()
-        }
-        outcomes += outcomes_of(trial, findings)
+        outcomes += _judged(trial, detector, primitive, experiment)
         on_class(trial.label)
-    return outcomes
+    return Assessment(outcomes)
 
 
 def judge_by_calibrated(
     trials: Sequence[Trial], experiment: Experiment, on_class: Progress, **parameters: object
-) -> list[Outcome]:
+) -> Assessment:
     """The calibrated detector: every class taught with its variation, all of them calibrated together.
 
     Parameters
     ----------
     parameters : of `FailureDetector`, to see what they do.
     """
-    configuration = replace(Configuration(), n_basis=experiment.configuration.n_basis)
-    options = LearningOptions("hierarchical")
-    primitives = {trial.label: fit_primitive(trial.training, configuration, options)[0] for trial in trials}
+    primitives = {trial.label: _varied_primitive(trial, experiment) for trial in trials}
     detector = FailureDetector(experiment.false_alarm_rate, **parameters)  # type: ignore[arg-type]
     asked = {t.label: commanded_tasks(primitives[t.label], t.training, experiment.task) for t in trials}
     detector.fit(primitives, {trial.label: trial.training for trial in trials}, tasks=asked)
     outcomes: list[Outcome] = []
     for trial in trials:
-        primitive = primitives[trial.label]
-        tasks = commanded_tasks(primitive, trial.tests, experiment.task)
-        findings = {
-            name: _findings(detector, primitive, tasks, executions, experiment.traces)
-            for name, executions in trial.executions.items()
-        }
-        outcomes += outcomes_of(trial, findings)
+        outcomes += _judged(trial, detector, primitives[trial.label], experiment)
         on_class(trial.label)
-    return outcomes
+    return Assessment(outcomes, detector.calibrations_)
+
+
+def _judged(trial: Trial, detector: FailureDetector, primitive: Primitive, experiment: Experiment) -> list[Outcome]:
+    tasks = commanded_tasks(primitive, trial.tests, experiment.task)
+    findings = {
+        name: _findings(detector, primitive, tasks, executions, experiment.traces)
+        for name, executions in trial.executions.items()
+    }
+    return outcomes_of(trial, findings)
 
 
 def _findings(
@@ -125,7 +134,8 @@ def _findings(
         ratios = np.array([monitor.update(observed) for observed in ticks])
         verdict = monitor.verdict
         alarm = verdict.time if verdict.failed else None
-        findings.append(Finding(alarm, verdict.kind, verdict.cause, Trace(execution.times, ratios) if traces else None))
+        trace = Trace(execution.times, ratios) if traces else None
+        findings.append(Finding(alarm, verdict.kind, verdict.cause, verdict.better, trace))
     return findings
 
 

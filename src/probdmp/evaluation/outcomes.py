@@ -1,12 +1,13 @@
-"""What judges say of each execution."""
+"""What judges say of each execution, and of themselves."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from probdmp.checks import FloatArray, freeze_arrays
+from probdmp.detection import CalibrationFacts
 from probdmp.evaluation.trials import UNDISTURBED, Trial
 
-__all__ = ["Finding", "Outcome", "Trace", "outcomes_of"]
+__all__ = ["Assessment", "Finding", "Outcome", "Trace", "outcomes_of"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,6 +34,8 @@ class Finding:
     `"sensor"` are about the movement."""
     cause: str = ""
     """What it is in particular, such as `"held"`."""
+    better: str = ""
+    """Label of a class that fits the execution better, if the judge names one."""
     trace: Trace | None = field(default=None, compare=False)
     """Where `Experiment.traces` asks for it."""
 
@@ -58,6 +61,16 @@ class Outcome:
     def alarms(self) -> dict[str, float | None]:
         """By fault: when the faulty execution was called failed, if it was; seconds."""
         return {fault: self.findings[fault].alarm for fault in self.onsets}
+
+
+@dataclass(frozen=True, slots=True)
+class Assessment:
+    """All that a judge says of one split."""
+
+    outcomes: Sequence[Outcome]
+    """One for each test execution, in the order of the trials."""
+    calibrations: tuple[CalibrationFacts, ...] = ()
+    """Where its thresholds come from, if it is calibrated and tells."""
 
 
 def outcomes_of(trial: Trial, findings: Mapping[str, Sequence[Finding]]) -> list[Outcome]:

@@ -10,7 +10,7 @@ from probdmp.errors import InputError
 from probdmp.evaluation.experiment import Experiment
 from probdmp.evaluation.judges import DETECTORS, READINGS, Judge, Progress
 from probdmp.evaluation.metrics import BOOTSTRAP, CLOPPER_PEARSON
-from probdmp.evaluation.outcomes import Outcome
+from probdmp.evaluation.outcomes import Assessment, Outcome
 from probdmp.evaluation.summary import Summary, published_summary, summarize
 from probdmp.evaluation.trials import draw_trials, group_by_label
 
@@ -22,14 +22,14 @@ class Evaluation:
     """What came of an experiment."""
 
     experiment: Experiment
-    by_seed: Mapping[int, Mapping[str, Sequence[Outcome]]]
-    """By seed, then by judge: one entry per test execution."""
+    by_seed: Mapping[int, Mapping[str, Assessment]]
+    """By seed, then by judge."""
 
     @property
     def outcomes(self) -> dict[str, list[Outcome]]:
         """By judge, all seeds one after another."""
         splits = list(self.by_seed.values())
-        return {name: [outcome for split in splits for outcome in split[name]] for name in splits[0]}
+        return {name: [outcome for split in splits for outcome in split[name].outcomes] for name in splits[0]}
 
     def summaries(self) -> dict[str, Summary]:
         """The figures of each judge, over all seeds."""
@@ -48,7 +48,10 @@ class Evaluation:
             "seeds": experiment.seeds,
             "detector": experiment.detector,
             "task": experiment.task,
-            "configuration": {k: v for k, v in asdict(experiment.configuration).items() if k != "forcing_noise"},
+            "false_alarm_rate": experiment.false_alarm_rate if any(f["calibrations"] for f in figures) else None,
+            "configuration": {
+                k: v for k, v in asdict(experiment.configuration_for(experiment.detector)).items() if k != "forcing_noise"
+            },
             "interval": CLOPPER_PEARSON if len(self.by_seed) == 1 else BOOTSTRAP,
             **figures[0],
             "readings": figures,
@@ -57,10 +60,12 @@ class Evaluation:
         }
 
     def _figures(self, name: str, summary: Summary) -> dict[str, Any]:
-        if len(self.by_seed) == 1:
-            return summary.as_dict()
-        per_seed = [{"seed": seed, **summarize(split[name]).as_dict()} for seed, split in self.by_seed.items()]
-        return {**summary.as_dict(), "per_seed": per_seed}
+        assessments = {seed: split[name] for seed, split in self.by_seed.items()}
+        facts = [{"seed": seed, **asdict(one)} for seed, j in assessments.items() for one in j.calibrations]
+        figures = {**summary.as_dict(), "calibrations": facts}
+        if len(assessments) == 1:
+            return figures
+        return {**figures, "per_seed": [{"seed": seed, **summarize(j.outcomes).as_dict()} for seed, j in assessments.items()]}
 
 
 def evaluate(
@@ -91,11 +96,11 @@ def evaluate(
         trials = draw_trials(demonstrations, split)
         by_seed[seed] = {name: judge(trials, split, on_class) for name, judge in judges.items()}
         tests = [trial.label for trial in trials for _ in trial.tests]
-        for name, outcomes in by_seed[seed].items():
-            if [outcome.label for outcome in outcomes] != tests:
+        for name, assessment in by_seed[seed].items():
+            if [outcome.label for outcome in assessment.outcomes] != tests:
                 raise InputError(
                     f"from the judge {name!r} an outcome for each of {len(tests)} test executions, in the order of the trials",
-                    f"{len(outcomes)}",
+                    f"{len(assessment.outcomes)}",
                     "outcomes_of puts the findings of a trial together.",
                 )
     return Evaluation(experiment, by_seed)

@@ -17,6 +17,8 @@ __all__ = ["FaultSummary", "OnsetBin", "Summary", "WorstClass", "published_summa
 
 N_ONSET_BINS = 4
 DECILES = np.linspace(0.1, 0.9, 9)
+HELD = {"hold": True, "slow": False}
+"""Whether a movement with this fault stands still."""
 SENSOR_KIND = "sensor"
 """Kind of the alarms that are about a sensor; all others are about motion or timing."""
 
@@ -59,6 +61,9 @@ class FaultSummary:
     """Of a benign fault: alarms at any time that are about motion or timing."""
     called_sensor: Rate | None = None
     """Of a sensor fault: detected, and said to be about a sensor."""
+    told_apart: Rate | None = None
+    """Of `hold` and `slow`, and of those detected: a blocked movement called held, a slow one called anything else. None: of
+    other faults, or where the judge gives no causes."""
     kinds: Mapping[str, int] | None = None
     """What the alarms of those detected are about, and how many are. None: not reported."""
     latency_median: float | None = None
@@ -109,7 +114,7 @@ def summarize(outcomes: Sequence[Outcome], n_splits: int = 1) -> Summary:
     worst, its = max(by_class.items(), key=lambda item: item[1].rate)
     return Summary(
         rate(_called_failed(outcomes)),
-        {fault: _summarize_fault(fault, outcomes, rate) for fault in outcomes[0].onsets},
+        {fault: _summarize_fault(fault, outcomes, rate, n_splits) for fault in outcomes[0].onsets},
         WorstClass(worst, its.count, its.n, its.rate),
     )
 
@@ -122,7 +127,7 @@ def _called_failed(outcomes: Sequence[Outcome]) -> list[bool]:
     return [o.false_alarm is not None for o in outcomes]
 
 
-def _summarize_fault(fault: str, outcomes: Sequence[Outcome], rate: RateOf) -> FaultSummary:
+def _summarize_fault(fault: str, outcomes: Sequence[Outcome], rate: RateOf, n_splits: int) -> FaultSummary:
     nature = fault_named(fault).nature
     findings = [o.findings[fault] for o in outcomes]
     ever = [f.alarm is not None for f in findings]
@@ -135,10 +140,19 @@ def _summarize_fault(fault: str, outcomes: Sequence[Outcome], rate: RateOf) -> F
         ever=rate(ever),
         false_alarms=rate([e and not s for e, _, s in both]) if nature == BENIGN else None,
         called_sensor=rate([d and s for _, d, s in both]) if nature == SENSOR else None,
+        told_apart=_told_apart(fault, [o for o, d in zip(outcomes, detected, strict=True) if d], n_splits),
         kinds=dict(Counter(f.cause or f.kind for f, d in zip(findings, detected, strict=True) if d)),
         **_latencies(fault, [o for o, d in zip(outcomes, detected, strict=True) if d]),
         by_onset=_by_onset(fault, outcomes, detected),
     )
+
+
+def _told_apart(fault: str, detected: Sequence[Outcome], n_splits: int) -> Rate | None:
+    causes = [o.findings[fault].cause for o in detected]
+    if fault not in HELD or not any(causes):
+        return None
+    right = [(cause == "held") == HELD[fault] for cause in causes]
+    return _exact_rate(right) if n_splits == 1 else rate_over_classes(right, [o.label for o in detected], n_splits)
 
 
 def _latencies(fault: str, detected: Sequence[Outcome]) -> dict[str, Any]:

@@ -11,8 +11,9 @@ from probdmp.plotting.trajectories import plot_rollout
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
-__all__ = ["plot_judged_execution", "plot_log_likelihoods"]
+__all__ = ["draw_failure_detection", "plot_judged_execution", "plot_log_likelihoods"]
 
 
 def plot_judged_execution(ax: "Axes", illustration: Illustration, judged: JudgedExecution, dof: int) -> "Axes":
@@ -49,3 +50,16 @@ def plot_log_likelihoods(ax: "Axes", illustration: Illustration) -> "Axes":
     ax.set_ylabel("Log-likelihood per step [nats]")
     ax.legend(loc="best")
     return ax
+
+
+def draw_failure_detection(illustration: Illustration) -> "Figure":
+    """The paper's figure: undisturbed, disturbed, log-likelihoods; of the degree of freedom that is blamed."""
+    import matplotlib.pyplot as plt
+
+    dof = int(illustration.disturbed.verdict.contributions.argmin())
+    figure, (left, middle, right) = plt.subplots(1, 3, figsize=(11, 3.2), layout="constrained")
+    plot_judged_execution(left, illustration, illustration.undisturbed, dof).set_title("As recorded")
+    plot_judged_execution(middle, illustration, illustration.disturbed, dof).set_title(f"With the fault “{illustration.fault}”")
+    plot_log_likelihoods(right, illustration).set_title("Log-likelihood")
+    middle.sharey(left)
+    return figure

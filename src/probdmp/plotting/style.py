@@ -10,13 +10,16 @@ from probdmp.execution.trajectory import HALF_BAND
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["ALARM", "BAND", "FAULTY", "MEAN", "RECORDED", "band", "figure_style", "require_matplotlib"]
+__all__ = ["ALARM", "BAND", "FAULTY", "MEAN", "RECORDED", "band", "figure_style", "require_matplotlib", "series"]
 
 MEAN = "#1f3a5f"
 BAND = "#9db8d9"
 RECORDED = "#2f7d4f"
 FAULTY = "#c1440e"
 ALARM = "#7a1fa2"
+
+SERIES = (MEAN, FAULTY, RECORDED, ALARM, "#8c6d1f", "#4a90b8", "#5f5f5f")
+LINES = ("-", "--", "-.", (0, (1, 1)), (0, (5, 1, 1, 1, 1, 1)))
 
 SETTINGS: Any = {
     "axes.spines.top": False,
@@ -48,6 +51,11 @@ def figure_style() -> AbstractContextManager[None]:
     import matplotlib
 
     return matplotlib.rc_context(SETTINGS)
+
+
+def series(k: int) -> dict[str, Any]:
+    """How the line of the k-th of several things is drawn; neighbours differ in more than colour."""
+    return {"color": SERIES[k % len(SERIES)], "linestyle": LINES[k % len(LINES)]}
 
 
 def band(ax: "Axes", times: Any, means: Any, stds: Any, label: str | None = None) -> "Axes":

@@ -9,8 +9,9 @@ from probdmp.plotting.style import MEAN, band
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
-__all__ = ["plot_paths", "plot_rollout"]
+__all__ = ["draw_bands", "plot_paths", "plot_rollout"]
 
 QUANTITIES = {
     "position": ("positions", "position_stds", ""),
@@ -44,3 +45,23 @@ def plot_paths(ax: "Axes", demonstrations: Sequence[Demonstration], rollout: Gau
     ax.set_xlabel(f"{rollout.names[0]} [{rollout.units or '–'}]")
     ax.set_ylabel(f"{rollout.names[1]} [{rollout.units or '–'}]")
     return ax
+
+
+def draw_bands(demonstrations: Sequence[Demonstration], rollout: GaussianTrajectory) -> "Figure":
+    """Demonstrations and bands of the first two degrees of freedom."""
+    import matplotlib.pyplot as plt
+
+    n_dof = min(len(rollout.names), 2)
+    figure, axes = plt.subplot_mosaic(
+        [["path", *(f"{quantity} {dof}" for quantity in QUANTITIES)] for dof in range(n_dof)],
+        figsize=(11, 2.6 * n_dof),
+        layout="constrained",
+    )
+    if n_dof == 2:
+        plot_paths(axes["path"], demonstrations, rollout)
+    else:
+        axes["path"].set_axis_off()
+    for dof in range(n_dof):
+        for quantity in QUANTITIES:
+            plot_rollout(axes[f"{quantity} {dof}"], rollout, dof, quantity)
+    return figure
