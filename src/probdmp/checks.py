@@ -30,6 +30,7 @@ __all__ = [
 ]
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 LARGEST_MAGNITUDE = 1e100
 """Values beyond this are refused: variances square them, and the square must stay finite."""

@@ -45,7 +45,7 @@ def test_any_sampling_rate_of_a_piecewise_linear_path_gives_the_same_ticks(seed,
 @given(seeds, st.floats(0.003, 0.2), st.floats(0, 0.7))
 def test_every_tick_comes_once_and_in_order(seed, dt, missing):
     ticks = run(lossy(np.random.default_rng(seed), 60, 2, missing), dt)
-    assert [tick.index for tick, _ in ticks] == list(range(len(ticks)))
+    assert [tick.number for tick, _ in ticks] == list(range(len(ticks)))
 
 
 @given(seeds, st.floats(0.003, 0.2), st.floats(0, 0.7), st.integers(1, 59))
@@ -63,8 +63,8 @@ def test_a_tick_waits_for_the_next_sample_and_no_longer(seed, dt):
     ticks = run(lossy(np.random.default_rng(seed), 80, 1, 0.0), dt)
     rate = TICKS / DURATION
     for tick, t in ticks:
-        assert tick.index <= t * dt * rate + 1e-6
-        assert tick.index > (t - 1) * dt * rate + 1e-6 or tick.index == 0
+        assert tick.number <= t * dt * rate + 1e-6
+        assert tick.number > (t - 1) * dt * rate + 1e-6 or tick.number == 0
 
 
 @pytest.mark.parametrize("dt", [DURATION / 1000, DURATION / 500, DURATION / 100])
@@ -81,8 +81,8 @@ def test_short_gaps_are_bridged_and_long_ones_are_not(dt, gap):
         np.testing.assert_allclose(inside, 3 * np.arange(41, 40 + gap), rtol=1e-9)
     else:
         assert np.isnan(inside).all()
-    outside = [tick for tick in ticks if not 40 < tick.index < 40 + gap]
-    np.testing.assert_allclose([tick.values[0] for tick in outside], [3 * tick.index for tick in outside], rtol=1e-9)
+    outside = [tick for tick in ticks if not 40 < tick.number < 40 + gap]
+    np.testing.assert_allclose([tick.values[0] for tick in outside], [3 * tick.number for tick in outside], rtol=1e-9)
 
 
 def test_slow_sampling_is_no_gap():
@@ -112,7 +112,7 @@ def test_degrees_of_freedom_do_not_hear_of_each_other(seed, lost):
 def test_a_silent_sensor_holds_up_nothing_for_long():
     values = np.column_stack([np.arange(200.0), np.full(200, np.nan)])
     for tick, t in run(values, DURATION / 150):
-        assert t / 1.5 - tick.index <= LONGEST_GAP + 1
+        assert t / 1.5 - tick.number <= LONGEST_GAP + 1
 
 
 def test_ticks_go_on_after_the_movement_should_be_over():

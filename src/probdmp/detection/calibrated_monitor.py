@@ -6,6 +6,8 @@ import numpy as np
 
 from probdmp.checks import FloatArray
 from probdmp.detection.calibration import Calibration
+from probdmp.detection.diagnosis import HELD
+from probdmp.detection.sensor_watch import SensorWatch
 from probdmp.detection.sources import Source
 from probdmp.detection.verdict import Verdict
 from probdmp.execution import Observed
@@ -21,6 +23,7 @@ class CalibratedMonitor:
 
     Parameters
     ----------
+    label : of the primitive, which may have a threshold of its own.
     channels : (C) names of the channels.
     persistence : moments in a row with a test ratio above 1 that make an alarm.
     """
@@ -29,12 +32,13 @@ class CalibratedMonitor:
         self,
         source: Source,
         calibration: Calibration,
+        label: str,
         channels: tuple[str, ...],
         names: tuple[str, ...],
         persistence: int,
     ) -> None:
         self._source, self._calibration, self._channels = source, calibration, channels
-        self._persistence = persistence
+        self._threshold, self._persistence = calibration.threshold_for(label), persistence
         self._ratio, self._n_above, self._n_since, self._is_latched = 0.0, 0, 0, False
         self._verdict = Verdict(False, 0, 0.0, 1.0, 0.0, np.zeros(len(names)), names)
 
@@ -45,32 +49,30 @@ class CalibratedMonitor:
 
     def update(self, observed: Observed) -> float:
         """Take one tick into account; returns the test ratio, above 1 for an alarm."""
-        for values in self._source.update(observed):
-            self._judge(observed, values)
-        source, verdict = self._source, self._verdict
-        if source.sensor_fault and not verdict.has_sensor_fault:
-            self._note_sensor(observed)
-        elif source.is_stale != verdict.is_stale:
-            self._verdict = replace(verdict, is_stale=source.is_stale)
-            if source.is_stale and not verdict.failed:
-                self._latch(observed, 1.0, np.zeros(len(verdict.names)))
-                self._is_latched = True
-                self._verdict = replace(self._verdict, failed=True, kind="data missing", cause="nothing measured")
+        ratios = [self._judge(observed, values) for values in self._source.update(observed)]
+        self._ratio = max(ratios, default=self._ratio)
+        sensors = self._source.sensors
+        if sensors is not None:
+            if sensors.cause and not self._verdict.has_sensor_fault:
+                self._note_sensor(observed, sensors)
+            if sensors.is_stale != self._verdict.is_stale:
+                self._note_silence(observed, sensors)
         return self._ratio
 
-    def _judge(self, observed: Observed, values: FloatArray) -> None:
+    def _judge(self, observed: Observed, values: FloatArray) -> float:
         surprises = self._calibration.surprises_now(values)
         channel = max(range(len(surprises)), key=surprises.__getitem__)
-        self._ratio = surprises[channel] / self._calibration.threshold
-        self._n_above = self._n_above + 1 if self._ratio > 1 else 0
+        ratio = surprises[channel] / self._threshold
+        self._n_above = self._n_above + 1 if ratio > 1 else 0
         if self._is_latched:
             self._look_closer()
-        elif self._ratio > self._verdict.test_ratio or self._n_above >= self._persistence:
-            self._latch(observed, self._ratio, self._source.contributions(channel), self._channels[channel])
+        elif ratio > self._verdict.test_ratio or self._n_above >= self._persistence:
+            self._latch(observed, ratio, self._source.contributions(channel), self._channels[channel])
             if self._n_above >= self._persistence:
                 self._is_latched = True
                 self._verdict = replace(self._verdict, failed=True)
                 self._look_closer()
+        return ratio
 
     def _latch(self, observed: Observed, ratio: float, contributions: FloatArray, channel: str = "") -> None:
         self._verdict = replace(
@@ -92,12 +94,19 @@ class CalibratedMonitor:
                 self._verdict = replace(self._verdict, kind=kind, cause=cause, better=better)
             self._n_since += 1
 
-    def _note_sensor(self, observed: Observed) -> None:
-        """A sensor fault explains what the movement seemed to do."""
-        shares = self._source.sensor_shares
+    def _note_sensor(self, observed: Observed, sensors: SensorWatch) -> None:
+        """A sensor fault explains what the movement seemed to do; but what is held may well repeat itself, without noise."""
+        held = self._verdict.cause == HELD and sensors.all_repeat
         if not self._verdict.failed:
-            self._latch(observed, float(shares.max()), np.zeros(len(shares)), "sensor")
+            self._latch(observed, sensors.ratio, np.zeros(len(self._verdict.names)), "sensor")
         self._is_latched = True
-        self._verdict = replace(
-            self._verdict, failed=True, has_sensor_fault=True, kind="sensor", cause=self._source.sensor_fault, better=""
-        )
+        kind, cause = (self._verdict.kind, HELD) if held else ("sensor", sensors.cause)
+        self._verdict = replace(self._verdict, failed=True, has_sensor_fault=True, kind=kind, cause=cause, better="")
+
+    def _note_silence(self, observed: Observed, sensors: SensorWatch) -> None:
+        """What is not seen cannot be called fine."""
+        if sensors.is_stale and not self._verdict.failed:
+            self._latch(observed, sensors.staleness, np.zeros(len(self._verdict.names)), "silence")
+            self._is_latched = True
+            self._verdict = replace(self._verdict, failed=True, kind="data missing", cause="nothing measured")
+        self._verdict = replace(self._verdict, is_stale=sensors.is_stale)

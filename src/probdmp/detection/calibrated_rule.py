@@ -165,7 +165,8 @@ class CalibratedRule:
 
     def _monitor(self, primitive: Primitive, task: Task, source: Source) -> CalibratedMonitor:
         calibration = self.calibration(primitive, task)
-        return CalibratedMonitor(source, calibration, self.family.channels, primitive.names, self.options.persistence)
+        label, channels = self._labels[primitive.identity], self.family.channels
+        return CalibratedMonitor(source, calibration, label, channels, primitive.names, self.options.persistence)
 
 
 def _tasks(member: Member, knows_goal: bool) -> list[Task]:
@@ -209,9 +210,7 @@ def _calibration(maxima: FloatArray, labels: Sequence[str], options: DetectorOpt
     return Calibration(maxima, labels, rate, method, family.floors, family.handicaps)
 
 
-def _restored(
-    values: Mapping[str, Any], options: DetectorOptions, family: Family, expected: Collection[str]
-) -> Calibration:
+def _restored(values: Mapping[str, Any], options: DetectorOptions, family: Family, expected: Collection[str]) -> Calibration:
     """A calibration on executions of the expected primitives."""
     _check_keys(values, ("maxima", "labels"))
     labels = values["labels"]

@@ -6,6 +6,9 @@
     statistic                            T[t] = max_c (L_c(a_c[t]) - handicap_c)
     threshold                            h with a share alpha of executions whose largest T_i exceeds it
 
+Some primitives vary more than the model says and would take more than their share of the false alarms. One with more executions
+among the most surprising tenth than chance explains is a suspect; its threshold is no lower than its own largest T_i.
+
 alpha counts executions, not ticks. With alpha (n + 1) >= 5 the threshold is an order statistic of the n values T_i
 (conformal); below that it lies on an exponential tail fitted to those above their 80 % quantile. n executions can show no
 rate below 1 / (n + 1).
@@ -69,7 +72,8 @@ class Calibration:
         self._sorted = np.sort(self.maxima, axis=0)
         self._ranked = self._sorted.T.tolist()
         self._handicaps = np.broadcast_to(handicaps, self.maxima.shape[1:])
-        least = np.maximum(floors, np.finfo(float).tiny)
+        self._floors = np.broadcast_to(floors, self.maxima.shape[1:])
+        least = np.maximum(self._floors, np.finfo(float).tiny)
         self._starts = np.maximum(np.quantile(self.maxima, 1 - TAIL_SHARE, axis=0), least)
         beyond = self.maxima > self._starts
         excesses = np.where(beyond, np.log(np.maximum(self.maxima, self._starts) / self._starts), 0.0)
@@ -108,6 +112,20 @@ class Calibration:
         counts = Counter(self.labels)
         chance = {label: binom.sf(k - 1, counts[label], share) for label, k in alarms.items()}
         return {label: alarms[label] / counts[label] for label in sorted(alarms) if chance[label] < SUSPECT}
+
+    @cached_property
+    def own_thresholds(self) -> dict[str, float]:
+        """Thresholds of the suspects: no lower than what their own calibration executions have reached."""
+        own = {label: [t for k, t in zip(self.labels, self.statistics, strict=True) if k == label] for label in self.suspects}
+        return {label: max(self.threshold, *map(float, statistics)) for label, statistics in own.items()}
+
+    def threshold_for(self, label: str) -> float:
+        """The threshold of a primitive: the common one, unless it is suspected to need a higher one."""
+        return self.own_thresholds.get(label, self.threshold)
+
+    def at_rate(self, false_alarm_rate: float) -> "Calibration":
+        """The same calibration executions at another false-alarm rate."""
+        return Calibration(self.maxima, self.labels, false_alarm_rate, self.method, self._floors, self._handicaps)
 
     def surprise(self, values: FloatArray) -> FloatArray:
         """-ln of the share of normal executions that ever reach values (…, C), by channel, less its handicap; at least 0."""

@@ -36,15 +36,23 @@ class CalibrationFacts:
     thresholds: Mapping[float, float]
     """By rate: what the threshold would be if it were asked for."""
     suspects: Mapping[str, float]
-    """Primitives with more calibration executions above the threshold than chance explains: label to their share."""
+    """Primitives with more executions among the most surprising tenth than chance explains: label to their share of it."""
+    own_thresholds: Mapping[str, float]
+    """The higher thresholds of the suspects, by label."""
     suspects_at: Mapping[float, Mapping[str, float]]
     """By rate: which primitives would be suspects."""
+    own_thresholds_at: Mapping[float, Mapping[str, float]]
+    """By rate: what their thresholds would be."""
+
+    def relative_level(self, rate: float, label: str) -> float:
+        """Threshold of a primitive at one of the reported rates, relative to the one that it has."""
+        return self.own_thresholds_at[rate].get(label, self.thresholds[rate]) / self.own_thresholds.get(label, self.threshold)
 
 
 def facts_of(calibration: Calibration, task: str, label: str) -> CalibrationFacts:
     """The facts about a calibration; `task` and `label` as in `CalibrationFacts`."""
     c = calibration
-    others = {rate: Calibration(c.maxima, c.labels, rate, c.method) for rate in REPORTED_RATES}
+    others = {rate: c.at_rate(rate) for rate in REPORTED_RATES}
     return CalibrationFacts(
         task=task,
         label=label,
@@ -57,5 +65,7 @@ def facts_of(calibration: Calibration, task: str, label: str) -> CalibrationFact
         threshold=c.threshold,
         thresholds={rate: other.threshold for rate, other in others.items()},
         suspects=c.suspects,
+        own_thresholds=c.own_thresholds,
+        own_thresholds_at={rate: other.own_thresholds for rate, other in others.items()},
         suspects_at={rate: other.suspects for rate, other in others.items()},
     )

@@ -42,8 +42,8 @@ class FailureDetector:
     pooled : whether the primitives of a library share one threshold, so that few demonstrations of each are enough.
     persistence : moments in a row (hundredths of the duration for `"trajectory"`, samples otherwise) that must be above the
         threshold. Every one more makes the alarm that much later, and rarer.
-    likelihood : of the paper's rule: `"per_step"`: of each step by itself; `"cumulative"`: of all steps so far. The paper does not
-        say which.
+    likelihood : of the paper's rule: `"per_step"`: of each step by itself; `"cumulative"`: of all steps so far. The paper does
+        not say which.
 
     Attributes
     ----------
@@ -133,7 +133,7 @@ class FailureDetector:
         ----------
         dt, tasks : as in `fit`, one task for each execution; unless given, it was told nothing but its start.
         """
-        rule = self._fitted()
+        self._fitted()
         dts = {primitive.dt for primitive in self.primitives_.values()}
         recordings = as_demonstrations(executions, dts.pop() if dt is None and len(dts) == 1 else dt)
         if tasks is not None:
@@ -142,7 +142,7 @@ class FailureDetector:
         for label, members in self._members(recordings).items():
             primitive, chosen = self.primitives_[label], [recordings[k] for k in members]
             asked = [tasks[k] for k in members] if tasks is not None else own_tasks(primitive, chosen)
-            for k, (monitor, ticks) in zip(members, rule.replay(primitive, asked, chosen), strict=True):
+            for k, (monitor, ticks) in zip(members, self.replay(primitive, asked, chosen), strict=True):
                 for observed in ticks:
                     monitor.update(observed)
                 verdicts[k] = monitor.verdict

@@ -2,10 +2,10 @@
 
 What has not moved lately is held. Otherwise explanations compete, each with an onset o some ticks ago:
 
-    pace     the movement as taught, but since o at speed r for w ticks: tick u of the execution is phase phi(u) of the movement,
+    pace     the movement as taught, but since o at speed r for w ticks: tick u of the execution is phase phi(u) of it,
              phi(u) = u until o, then o + r (u - o), and after w ticks on again as before, but late or early
-    aside    the movement on time, but since o pushed aside: y(u) = path(u) + b g(u - o), b ~ N(0, ASIDE_STD^2 I), g rising to 1
-             for good, or for a while
+    aside    the movement on time, but since o pushed aside: y(u) = path(u) + b g(u - o), b ~ N(0, ASIDE_STD^2 I), g rising
+             to 1 for good, or for a while
 
 Under each the execution is a draw from a Gaussian over paths. The explanation with the largest density wins; a pace also has to
 explain what came after its onset about as well as ordinary executions are explained.
@@ -21,7 +21,9 @@ from probdmp.detection.path_model import PathModel
 from probdmp.detection.phase_clock import TICKS
 from probdmp.detection.trajectory_statistics import DEGREES_OF_FREEDOM
 
-__all__ = ["LOOKED_AT", "Diagnosis", "diagnose"]
+__all__ = ["HELD", "LOOKED_AT", "Diagnosis", "diagnose"]
+
+HELD = "held"
 
 REST_TICKS = (4, 8)
 """Ticks without movement that make a standstill: at the alarm, and once there was time to see."""
@@ -43,7 +45,7 @@ WIDTHS = np.array([10, 20, 35])
 ASIDE_STD = 0.3
 """How far it may be, as a fraction of the range."""
 FOLLOWS = 5.0
-"""Squared deviation per number, relative to the sloppiness before, up to which what came later follows from what came before."""
+"""Squared deviation per number, relative to the sloppiness before, up to which what came later follows from the rest."""
 CLEARLY = 6.0
 """Nats by which an uneven pace has to be likelier than an even one."""
 
@@ -71,7 +73,7 @@ def diagnose(
     """
     n_rest = min(REST_TICKS[0] + seen_since, REST_TICKS[1])
     if _is_held(means, list(recent), tick, REST_EXTENT + 1.5 * noise_stds, n_rest):
-        return Diagnosis("timing", "held")
+        return Diagnosis("timing", HELD)
     back = np.array([j for j in LOOKED_AT if j < len(recent) and not np.isnan(recent[-1 - j]).any()], dtype=int)
     explanations = _explanations(int(back.max()) if len(back) else 0)
     if len(explanations.onsets) < 2:

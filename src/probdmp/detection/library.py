@@ -62,7 +62,6 @@ class Library:
             members[label] = Member(primitive, chosen, None if given is None else check_tasks(given, chosen), taught_by)
         return cls(members)
 
-
     def check_taught(self, taught: bool) -> None:
         """Refuse recordings that should have taught the primitive and did not, or the other way round, as far as is known."""
         for label, member in self.members.items():

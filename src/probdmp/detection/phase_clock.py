@@ -8,6 +8,7 @@ the path is taken for straight. A tick waits for the first sample after it; wher
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from probdmp.checks import FloatArray
 
@@ -23,7 +24,7 @@ ROUNDING = 1e-6
 class Tick(NamedTuple):
     """The movement at one tick."""
 
-    index: int
+    number: int
     """Ticks since the start; beyond `TICKS` once the movement should be over."""
     values: FloatArray
     """(D,) array, as given to the clock; NaN where nothing was seen around the tick."""
@@ -68,19 +69,19 @@ class PhaseClock:
         self._last_values = np.where(seen, values, self._last_values)
         ready = 0
         for tick in self._pending:
-            if np.isnan(tick.values).any() and now - tick.index < self._longest_gap:
+            if np.isnan(tick.values).any() and now - tick.number < self._longest_gap:
                 break
             ready += 1
         done, self._pending = self._pending[:ready], self._pending[ready:]
         return done
 
-    def _fill(self, now: float, values: FloatArray, seen: FloatArray) -> None:
+    def _fill(self, now: float, values: FloatArray, seen: NDArray[np.bool_]) -> None:
         """Straight lines from the last sample to this one, over the ticks between them."""
         gaps = now - self._last_times
         near = seen & (gaps <= self._longest_gap)
         slopes = np.where(near, (values - self._last_values) / np.maximum(gaps, ROUNDING), 0.0)
         for tick in self._pending:
-            here = seen & (np.abs(now - tick.index) <= ROUNDING)
-            reached = here | (near & (self._last_times <= tick.index + ROUNDING))
+            here = seen & (np.abs(now - tick.number) <= ROUNDING)
+            reached = here | (near & (self._last_times <= tick.number + ROUNDING))
             fill = reached & np.isnan(tick.values)
-            tick.values[fill] = (values - np.where(here, 0.0, slopes * (now - tick.index)))[fill]
+            tick.values[fill] = (values - np.where(here, 0.0, slopes * (now - tick.number)))[fill]

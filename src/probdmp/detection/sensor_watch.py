@@ -16,8 +16,8 @@ JUMP_FACTOR = 3.0
 """A sample is suspicious from so many times the largest jump of the demonstrations."""
 LEAST_JUMP = 0.05
 """And at least this fraction of the range."""
-SPIKES = 2
-"""So many spikes in an execution, of all degrees of freedom, make a sensor fault."""
+MOST_SPIKES = 1
+"""More spikes in an execution, of all degrees of freedom, make a sensor fault."""
 LEAST_REPEATS = 8
 LEAST_REPEAT_SHARE = 0.08
 """A sensor is stuck from so many exact repeats and this fraction of the duration, if the demonstrations have none."""
@@ -66,17 +66,27 @@ class SensorWatch:
         """What is wrong, in a word or two; nothing if nothing is."""
         if np.any(self.repeats > self._most_repeats):
             return "stuck"
-        return "spikes" if self.spikes.sum() >= SPIKES else ""
+        return "spikes" if self.spikes.sum() > MOST_SPIKES else ""
+
+    @property
+    def all_repeat(self) -> bool:
+        """Whether every sensor gives the same number again and again."""
+        return bool(np.all(self.repeats > 0))
 
     @property
     def is_stale(self) -> bool:
         """Whether a sensor has been silent for too long."""
-        return bool(np.any(self._silent > self._most_silent))
+        return self.staleness > 1
 
     @property
-    def shares(self) -> FloatArray:
-        """(D,) array: how far each sensor has gone towards being called faulty, 1 and more when it is."""
-        return np.maximum(self.repeats / self._most_repeats, self.spikes / SPIKES)
+    def ratio(self) -> float:
+        """Of what is wrong to what may be; above 1 for a fault."""
+        return max(float(np.max(self.repeats / self._most_repeats)), float(self.spikes.sum()) / MOST_SPIKES)
+
+    @property
+    def staleness(self) -> float:
+        """How long a sensor has been silent relative to how long it may be; above 1 when it is stale."""
+        return float(self._silent.max() / self._most_silent)
 
     def believe(self, measured: FloatArray) -> FloatArray:
         """The sample (D,) without what is suspicious of it, which is NaN instead; data units."""

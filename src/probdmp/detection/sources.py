@@ -11,6 +11,7 @@ import numpy as np
 
 from probdmp.checks import FloatArray
 from probdmp.detection.diagnosis import Diagnosis
+from probdmp.detection.sensor_watch import SensorWatch
 from probdmp.detection.statistics import standardized_contributions
 from probdmp.detection.trajectory_model import as_suspicion
 from probdmp.dmp import Task
@@ -44,18 +45,8 @@ class Source(Protocol):
         ...
 
     @property
-    def sensor_fault(self) -> str:
-        """What is wrong with a sensor, if anything is."""
-        ...
-
-    @property
-    def sensor_shares(self) -> FloatArray:
-        """(D,) array: how far each sensor is on the way to being faulty."""
-        ...
-
-    @property
-    def is_stale(self) -> bool:
-        """Whether nothing has been measured for too long."""
+    def sensors(self) -> SensorWatch | None:
+        """What watches the sensors, if anything does."""
         ...
 
 
@@ -64,8 +55,8 @@ class InnovationSource:
 
     Parameters
     ----------
-    statistic : `"log_likelihood"`: of a sample, as in the paper; `"nis"`: squared innovations in standard deviations, averaged over
-        a short time; `"cusum"`: their cumulative sum above what is normal (Page 1954).
+    statistic : `"log_likelihood"`: of a sample, as in the paper; `"nis"`: squared innovations in standard deviations, averaged
+        over a short time; `"cusum"`: their cumulative sum above what is normal (Page 1954).
     """
 
     def __init__(self, statistic: str, ranges: FloatArray, task: Task, dt: float) -> None:
@@ -95,13 +86,7 @@ class InnovationSource:
         """Nor what it is instead."""
         return ""
 
-    sensor_fault = ""
-    is_stale = False
-
-    @property
-    def sensor_shares(self) -> FloatArray:
-        """Not looked into."""
-        return np.zeros(len(self._ranges))
+    sensors = None
 
     def log_likelihood(self, observed: Observed) -> float:
         """How unlikely this sample is."""

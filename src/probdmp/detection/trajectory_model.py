@@ -4,7 +4,7 @@ from collections import deque
 
 import numpy as np
 
-from probdmp.checks import FloatArray
+from probdmp.checks import FloatArray, IntArray
 from probdmp.detection.path_model import PathModel
 from probdmp.detection.trajectory_statistics import (
     AHEAD,
@@ -27,7 +27,7 @@ __all__ = ["TrajectoryFollower", "TrajectoryModel", "as_suspicion"]
 LARGEST_LOG_RATIO = 500.0
 EVIDENCE_SCALE = 10.0
 """Nats of evidence for a standstill that multiply the value of its channel by e."""
-POINTS_AHEAD = tuple(int(np.flatnonzero(AHEAD == horizon)[0]) for horizon in HORIZONS)
+POINTS_AHEAD = tuple(int(np.flatnonzero(horizon == AHEAD)[0]) for horizon in HORIZONS)
 
 
 class TrajectoryModel:
@@ -105,7 +105,7 @@ class TrajectoryFollower:
         self._tick += 1
         self.recent.append(displacement)
 
-    def window(self, place: int, offsets: FloatArray) -> FloatArray:
+    def window(self, place: int, offsets: IntArray) -> FloatArray:
         """(1, 1, P, D) array: displacements at ticks place + offsets."""
         oldest = self._tick - len(self.recent) + 1
         ticks = np.maximum(place + offsets, 0) - oldest

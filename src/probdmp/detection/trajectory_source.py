@@ -11,6 +11,7 @@ from probdmp.detection.diagnosis import LOOKED_AT, Diagnosis, diagnose
 from probdmp.detection.execution_ticks import ExecutionTicks
 from probdmp.detection.phase_clock import TICKS
 from probdmp.detection.profile import ExecutionProfile
+from probdmp.detection.sensor_watch import SensorWatch
 from probdmp.detection.trajectory_model import TrajectoryFollower, TrajectoryModel
 from probdmp.detection.trajectory_statistics import CHANNELS, Displacement, Position
 from probdmp.dmp import Primitive, Task
@@ -44,9 +45,7 @@ class TrajectorySource:
     values : (T, C) array of what has been computed before, for recordings.
     """
 
-    def __init__(
-        self, expectation: Expectation, task: Task, dt: float, values: FloatArray | None = None
-    ) -> None:
+    def __init__(self, expectation: Expectation, task: Task, dt: float, values: FloatArray | None = None) -> None:
         self._expectation, self._values = expectation, values
         self._ticks = ExecutionTicks(expectation.primitive, expectation.profile, task, dt)
         self._follower: TrajectoryFollower | None = None
@@ -98,16 +97,6 @@ class TrajectorySource:
         return self._expectation.others.better(self._expectation.primitive, times, path)
 
     @property
-    def sensor_fault(self) -> str:
-        """What is wrong with a sensor, if anything is."""
-        return self._ticks.sensors.cause
-
-    @property
-    def sensor_shares(self) -> FloatArray:
-        """(D,) array: how far each sensor is on the way to being faulty."""
-        return self._ticks.sensors.shares
-
-    @property
-    def is_stale(self) -> bool:
-        """Whether nothing has been measured for too long."""
-        return self._ticks.sensors.is_stale
+    def sensors(self) -> SensorWatch:
+        """What watches the sensors."""
+        return self._ticks.sensors

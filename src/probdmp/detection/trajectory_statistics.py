@@ -14,7 +14,7 @@ from math import lgamma, log, pi
 
 import numpy as np
 
-from probdmp.checks import FloatArray
+from probdmp.checks import FloatArray, IntArray
 from probdmp.detection.path_model import PathModel
 from probdmp.detection.phase_clock import TICKS
 from probdmp.detection.windows import PathWindows
@@ -42,8 +42,8 @@ CHANNELS = ("position", "displacement", *(f"standstill_{horizon}" for horizon in
 FLOORS = np.array([0.0, 0.0, *(1.0 for _ in HORIZONS)])
 """Values up to which a channel is not suspicious: a standstill has to be likelier than its contrary."""
 HANDICAPS = np.array([2.0, 0.0, *(2.0 for _ in HORIZONS)])
-"""Nats of surprise by which a channel stands back behind displacement. What the others are for, a movement that ends elsewhere or
-stands still, becomes plain sooner or later; a push passes, and the false alarms that may be had are better spent on it."""
+"""Nats of surprise by which a channel stands back behind displacement. What the others are for, a movement that ends elsewhere
+or stands still, becomes plain sooner or later; a push passes, and the false alarms that may be had are better spent on it."""
 
 LAGS = np.array([3, 6, 9, 12, 15])
 DISPLACEMENT_SHIFTS = np.arange(-6, 7, 2)
@@ -73,12 +73,12 @@ MEMORY = int(BEFORE.max() + AHEAD.max()) + 1
 class Position:
     """Where an execution is."""
 
-    offsets = np.zeros(1, dtype=int)
+    offsets = np.zeros(1, dtype=np.int64)
 
     def __init__(self, model: PathModel) -> None:
-        self.windows = PathWindows(model, self.offsets, np.zeros(1, dtype=int), TICKS + 1)
+        self.windows = PathWindows(model, self.offsets, np.zeros(1, dtype=np.int64), TICKS + 1)
 
-    def judge(self, ticks: FloatArray, windows: FloatArray, means: FloatArray) -> FloatArray:
+    def judge(self, ticks: IntArray, windows: FloatArray, means: FloatArray) -> FloatArray:
         """Squared distance at the ticks (T,) of windows (n, T, 1, D): (n, T) array."""
         white = self.windows.whiten(ticks, windows, means)
         return np.where(white.counts[..., 0, 0] > 0, white.squares[..., 0, 0], np.nan)
@@ -94,7 +94,7 @@ class Displacement:
         n_places = TICKS + LAGS.max() + DISPLACEMENT_SHIFTS.max() + 1
         self.windows = PathWindows(model, self.offsets, DISPLACEMENT_SHIFTS, n_places, differences)
 
-    def judge(self, ticks: FloatArray, windows: FloatArray, means: FloatArray) -> FloatArray:
+    def judge(self, ticks: IntArray, windows: FloatArray, means: FloatArray) -> FloatArray:
         """Squared distance per degree of freedom, the least over shifts, of windows (n, T, P, D): (n, T) array."""
         white = self.windows.whiten(ticks, windows, means)
         squares = (white.squares[..., -1] + (DISPLACEMENT_SHIFTS / SHIFT_STD) ** 2).min(axis=-1)
@@ -137,7 +137,7 @@ class Forecast:
         self._rest_whitening = np.linalg.inv(np.linalg.cholesky(np.ones((ahead, ahead)) + np.eye(ahead)))
         self._rest_stds = np.sqrt(REST_STD**2 + model.noise_variances)
 
-    def judge(self, places: FloatArray, windows: FloatArray, means: FloatArray) -> FloatArray:
+    def judge(self, places: IntArray, windows: FloatArray, means: FloatArray) -> FloatArray:
         """ln p(at rest since the place) / p(gone on) for every point ahead that windows (n, T, P, D) hold: (n, T, points)."""
         white = self.windows.whiten(places, windows, means)
         scaled = np.log1p(white.squares / DEGREES_OF_FREEDOM) * (DEGREES_OF_FREEDOM + white.counts) / 2

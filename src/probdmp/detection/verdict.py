@@ -63,4 +63,5 @@ class Verdict:
             return f"fine: largest test ratio {self.test_ratio:.2f}{stale}"
         kind = f" [{self.kind}: {self.cause}]" if self.kind else ""
         better = f", looks like {self.better!r}" if self.better else ""
-        return f"failed at {self.time:.3f} s (phase {self.phase:.2f}){kind}: test ratio {self.test_ratio:.2f}, mostly {self.blamed}{better}"
+        when = f"failed at {self.time:.3f} s (phase {self.phase:.2f})"
+        return f"{when}{kind}: test ratio {self.test_ratio:.2f}, mostly {self.blamed}{better}"

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from probdmp.checks import FloatArray
+from probdmp.checks import FloatArray, IntArray
 from probdmp.detection.path_model import PathModel
 from probdmp.detection.phase_clock import TICKS
 
@@ -28,7 +28,7 @@ class WhiteWindows(NamedTuple):
     """How many numbers were seen up to each one."""
 
 
-def gather(paths: FloatArray, places: FloatArray, offsets: FloatArray) -> FloatArray:
+def gather(paths: FloatArray, places: IntArray, offsets: IntArray) -> FloatArray:
     """Paths (n, T, D) at ticks places + offsets: (n, places, offsets, D). Before the start a movement is where it starts."""
     return paths[:, np.clip(places[:, None] + offsets, 0, paths.shape[1] - 1)]
 
@@ -46,29 +46,30 @@ class PathWindows:
     """
 
     def __init__(
-        self, model: PathModel, offsets: FloatArray, shifts: FloatArray, n_places: int, combination: FloatArray | None = None
+        self, model: PathModel, offsets: IntArray, shifts: IntArray, n_places: int, combination: FloatArray | None = None
     ) -> None:
         self.offsets, self.shifts = np.asarray(offsets), np.asarray(shifts)
         self._combination = np.eye(len(self.offsets)) if combination is None else combination
         ticks = np.arange(n_places)[:, None, None] + self.offsets
         # Before the start there is no tempo: (T, S, P)
         self._ticks = np.where(ticks <= 0, 0, np.clip(ticks + self.shifts[:, None], 0, TICKS))
-        points, dof = len(self._combination), model.means.shape[1]
-        self._shape = (points, dof)
-        whole = model.covariance.transpose(0, 2, 1, 3)  # (M, M, D, D)
-        blocks = whole[self._ticks[..., :, None], self._ticks[..., None, :]]  # (T, S, P, P, D, D)
-        mixed = np.einsum("lp,tspqde,kq->tsldke", self._combination, blocks, self._combination, optimize=True)
-        noise = np.kron(self._combination @ self._combination.T, np.diag(model.noise_variances))
-        self._covariances = mixed.reshape(*mixed.shape[:2], points * dof, points * dof) + noise
-        self._whitening = np.linalg.inv(np.linalg.cholesky(self._covariances))
+        self._whole = model.covariance.transpose(0, 2, 1, 3)  # (M, M, D, D)
+        self._noise = np.kron(self._combination @ self._combination.T, np.diag(model.noise_variances))
+        self._whitening = np.linalg.inv(np.linalg.cholesky(self._covariances(self._ticks)))
 
-    def whiten(self, places: FloatArray, windows: FloatArray, means: FloatArray) -> WhiteWindows:
+    def _covariances(self, ticks: IntArray) -> FloatArray:
+        """Of windows at ticks (…, S, P) of the movement, noise included: (…, S, L D, L D) array."""
+        blocks = self._whole[ticks[..., :, None], ticks[..., None, :]]  # (…, P, P, D, D)
+        mixed = np.einsum("lp,...pqde,kq->...ldke", self._combination, blocks, self._combination, optimize=True)
+        return np.asarray(mixed.reshape(*ticks.shape[:-1], *self._noise.shape) + self._noise)
+
+    def whiten(self, places: IntArray, windows: FloatArray, means: FloatArray) -> WhiteWindows:
         """Compare windows with the model.
 
         Parameters
         ----------
         places : (T,) ticks.
-        windows : (n, T, P, D) array of displacements; NaN where nothing was seen. Where points are compared and not differences,
+        windows : (n, T, P, D) array of displacements; NaN where nothing was seen. Where points are compared, not differences,
             the first few suffice.
         means : (n, M, D) array, mean paths of the executions.
         """
@@ -100,7 +101,7 @@ class PathWindows:
         weighed = (whitening.T @ (whitening @ residuals.ravel())).reshape(residuals.shape)
         return np.abs((residuals * weighed).sum(axis=0)) * np.sign(residuals[-1])
 
-    def _residuals(self, rows: FloatArray, windows: FloatArray, means: FloatArray) -> FloatArray:
+    def _residuals(self, rows: IntArray, windows: FloatArray, means: FloatArray) -> FloatArray:
         """What is compared minus its mean at each shift, (n, T, S, L, D)."""
         points = windows.shape[2]
         combination = self._combination if points == len(self.offsets) else np.eye(points)
@@ -115,7 +116,9 @@ class PathWindows:
         seen = ~np.isnan(residuals[0])
         white, diagonal = np.zeros((2, len(self.shifts), size))
         if seen.any():
-            inverse = np.linalg.inv(np.linalg.cholesky(self._covariances[row][:, :size, :size][:, seen][:, :, seen]))
+            inverse = np.linalg.inv(
+                np.linalg.cholesky(self._covariances(self._ticks[row])[:, :size, :size][:, seen][:, :, seen])
+            )
             white[:, seen] = np.matmul(inverse, residuals[:, seen][..., None])[..., 0]
             diagonal[:, seen] = np.log(np.diagonal(inverse, axis1=-2, axis2=-1))
         return white, diagonal

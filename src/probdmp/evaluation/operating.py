@@ -78,7 +78,12 @@ def realized_rates(assessments: Sequence[Assessment]) -> list[RealizedRate]:
     found = []
     for nominal in facts[0].thresholds:
         levels = [one.thresholds[nominal] / one.threshold for one in facts]
-        judged = [o for j, level in zip(assessments, levels, strict=True) for o in at_level(j.outcomes, level)]
+        judged = [
+            judged
+            for assessment, one in zip(assessments, facts, strict=True)
+            for o in assessment.outcomes
+            for judged in at_level([o], one.relative_level(nominal, o.label))
+        ]
         rate = rate_of(sum(o.false_alarm is not None for o in judged), len(judged))
         above = nominal * (facts[0].n + 1)
         limits = np.asarray(betabinom.ppf([0.025, 0.975], m, above, facts[0].n + 1 - above)) / m
