@@ -1,6 +1,7 @@
 """An alarm: when it comes, what of it stays, what may be refined, and what ends it."""
 
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,6 +22,9 @@ LATCHED = ("failed", "step", "time", "phase", "test_ratio", "channel")
 class Script:
     """A source that says what it is told to say: values of one channel, a list for each tick."""
 
+    repeats = False
+    """Whether the sensors repeat themselves exactly."""
+
     def __init__(self, values, faults=None, stale=()):
         self.values, self.faults, self.stale, self.t = values, faults or {}, stale, -1
 
@@ -38,16 +42,12 @@ class Script:
         return "other"
 
     @property
-    def sensor_fault(self):
-        return max((fault for t, fault in self.faults.items() if t <= self.t), default="")
-
-    @property
-    def sensor_shares(self):
-        return np.array([0.0, 1.5])
-
-    @property
-    def is_stale(self):
-        return self.t in self.stale
+    def sensors(self):
+        cause = max((fault for t, fault in self.faults.items() if t <= self.t), default="")
+        stale = self.t in self.stale
+        return SimpleNamespace(
+            cause=cause, ratio=1.5, shares=np.array([0.0, 1.5]), staleness=1.5, is_stale=stale, all_repeat=self.repeats
+        )
 
 
 CALIBRATION = Calibration(np.arange(1.0, 100.0)[:, None], ["a"] * 99, 0.05, "held_out")
@@ -55,7 +55,7 @@ CALIBRATION = Calibration(np.arange(1.0, 100.0)[:, None], ["a"] * 99, 0.05, "hel
 
 def monitored(source, persistence=1):
     """The verdict and the test ratio after each tick."""
-    monitor = CalibratedMonitor(source, CALIBRATION, ("loudness",), ("x", "y"), persistence)
+    monitor = CalibratedMonitor(source, CALIBRATION, "a", ("loudness",), ("x", "y"), persistence)
     nothing, verdicts, ratios = np.full(2, np.nan), [], []
     for t in range(len(source.values)):
         ratios.append(monitor.update(Observed(t, t * 0.1, 0.9**t, nothing, nothing, nothing, nothing)))

@@ -163,7 +163,9 @@ def test_a_primitive_that_is_really_worse_is_suspected():
     maxima[30:40] *= exp(4)  # d
     found = calibration(maxima, 0.05, labels=labels)
     assert list(found.suspects) == ["d"]
-    assert found.suspects["d"] == np.mean(found.statistics[30:40] > found.threshold)
+    assert found.suspects["d"] == np.mean(found.statistics[30:40] > np.quantile(found.statistics, 0.9))
+    assert found.own_thresholds["d"] == found.threshold_for("d") == found.statistics[30:40].max() > found.threshold
+    assert found.threshold_for("a") == found.threshold
 
 
 def test_primitives_that_are_alike_are_rarely_suspected():

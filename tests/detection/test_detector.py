@@ -8,6 +8,7 @@ import pytest
 from detection.verdicts import assert_same, task_of
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from strategies import PAPERS_WEIGHTS
 
 from probdmp import FailureDetector, PrimitiveLibrary, ProbabilisticDMP, load, load_detector
 from probdmp.demonstrations import Demonstration
@@ -17,7 +18,7 @@ from probdmp.errors import InputError, InputTypeError, NotFittedError, TooFewDem
 
 @pytest.fixture(scope="module")
 def pooled_weights(training):
-    return ProbabilisticDMP(8).fit(training["l"])
+    return ProbabilisticDMP(8, **PAPERS_WEIGHTS).fit(training["l"])
 
 
 @pytest.fixture(scope="module")

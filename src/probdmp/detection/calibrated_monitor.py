@@ -98,7 +98,7 @@ class CalibratedMonitor:
         """A sensor fault explains what the movement seemed to do; but what is held may well repeat itself, without noise."""
         held = self._verdict.cause == HELD and sensors.all_repeat
         if not self._verdict.failed:
-            self._latch(observed, sensors.ratio, np.zeros(len(self._verdict.names)), "sensor")
+            self._latch(observed, sensors.ratio, sensors.shares, "sensor")
         self._is_latched = True
         kind, cause = (self._verdict.kind, HELD) if held else ("sensor", sensors.cause)
         self._verdict = replace(self._verdict, failed=True, has_sensor_fault=True, kind=kind, cause=cause, better="")

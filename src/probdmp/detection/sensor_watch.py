@@ -79,8 +79,13 @@ class SensorWatch:
         return self.staleness > 1
 
     @property
+    def shares(self) -> FloatArray:
+        """(D,) array: of what is wrong with each sensor to what may be."""
+        return np.maximum(self.repeats / self._most_repeats, self.spikes / MOST_SPIKES)
+
+    @property
     def ratio(self) -> float:
-        """Of what is wrong to what may be; above 1 for a fault."""
+        """Of what is wrong to what may be, of all sensors together; above 1 for a fault."""
         return max(float(np.max(self.repeats / self._most_repeats)), float(self.spikes.sum()) / MOST_SPIKES)
 
     @property

@@ -31,7 +31,7 @@ class Verdict:
     """Statistic over threshold at `step`: above 1 for an alarm."""
     contributions: FloatArray
     """(D,) array: squared deviation of each degree of freedom at `step`, in standard deviations of what was expected, with the
-    sign of the deviation (measured minus expected). The largest is to blame."""
+    sign of the deviation (measured minus expected); of a sensor fault, how far each sensor is to blame. The largest is."""
     names: tuple[str, ...]
     """(D) names of the degrees of freedom."""
     kind: str = ""
@@ -52,7 +52,9 @@ class Verdict:
 
     @property
     def blamed(self) -> str:
-        """The degree of freedom that contributes most, with the sign of its deviation."""
+        """The degree of freedom that contributes most, with the sign of its deviation; nothing if none does."""
+        if not np.any(self.contributions):
+            return ""
         largest = int(np.argmax(np.abs(self.contributions)))
         sign = {1: "+", -1: "−"}.get(int(np.sign(self.contributions[largest])), "")
         return f"{sign}{self.names[largest]}"
@@ -62,6 +64,7 @@ class Verdict:
             stale = "; nothing measured lately" if self.is_stale else ""
             return f"fine: largest test ratio {self.test_ratio:.2f}{stale}"
         kind = f" [{self.kind}: {self.cause}]" if self.kind else ""
+        mostly = f", mostly {self.blamed}" if self.blamed else ""
         better = f", looks like {self.better!r}" if self.better else ""
         when = f"failed at {self.time:.3f} s (phase {self.phase:.2f})"
-        return f"{when}{kind}: test ratio {self.test_ratio:.2f}, mostly {self.blamed}{better}"
+        return f"{when}{kind}: test ratio {self.test_ratio:.2f}{mostly}{better}"
