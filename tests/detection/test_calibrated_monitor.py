@@ -22,9 +22,6 @@ LATCHED = ("failed", "step", "time", "phase", "test_ratio", "channel")
 class Script:
     """A source that says what it is told to say: values of one channel, a list for each tick."""
 
-    repeats = False
-    """Whether the sensors repeat themselves exactly."""
-
     def __init__(self, values, faults=None, stale=()):
         self.values, self.faults, self.stale, self.t = values, faults or {}, stale, -1
 

@@ -38,7 +38,9 @@ def facts(**changes):
         "method": "conformal", "guarantee": "empirical", "threshold": 2.0, "thresholds": {0.05: 2.0, 0.5: 1.0}, "suspects": {},
         "suspects_at": {},
     }  # fmt: skip
-    return CalibrationFacts(**{**values, **changes})
+    values |= changes
+    own = {"own_thresholds": {}, "own_thresholds_at": {rate: {} for rate in values["thresholds"]}}
+    return CalibrationFacts(**{**own, **values})
 
 
 def test_an_alarm_about_a_sensor_has_a_threshold_of_its_own():

@@ -161,5 +161,6 @@ def test_known_and_nominal_tasks(members):
         np.testing.assert_array_equal([task.start, task.goal], d.positions[[0, -1]])
         assert task.duration == d.duration
     for d, task in zip(members, commanded_tasks(primitive, members, "nominal"), strict=True):
-        np.testing.assert_array_equal([task.start, task.goal], [d.positions[0], primitive.goal])
+        np.testing.assert_array_equal([task.start, primitive.goals(task)], [d.positions[0], primitive.goal])
+        assert np.isnan(task.goal).all()  # not told
         assert task.duration == primitive.duration

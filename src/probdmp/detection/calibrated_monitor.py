@@ -6,7 +6,6 @@ import numpy as np
 
 from probdmp.checks import FloatArray
 from probdmp.detection.calibration import Calibration
-from probdmp.detection.diagnosis import HELD
 from probdmp.detection.sensor_watch import SensorWatch
 from probdmp.detection.sources import Source
 from probdmp.detection.verdict import Verdict
@@ -95,13 +94,12 @@ class CalibratedMonitor:
             self._n_since += 1
 
     def _note_sensor(self, observed: Observed, sensors: SensorWatch) -> None:
-        """A sensor fault explains what the movement seemed to do; but what is held may well repeat itself, without noise."""
-        held = self._verdict.cause == HELD and sensors.all_repeat
+        """A sensor fault explains what the movement seemed to do."""
         if not self._verdict.failed:
             self._latch(observed, sensors.ratio, sensors.shares, "sensor")
         self._is_latched = True
-        kind, cause = (self._verdict.kind, HELD) if held else ("sensor", sensors.cause)
-        self._verdict = replace(self._verdict, failed=True, has_sensor_fault=True, kind=kind, cause=cause, better="")
+        found = {"kind": "sensor", "cause": sensors.cause, "better": ""}
+        self._verdict = replace(self._verdict, failed=True, has_sensor_fault=True, **found)
 
     def _note_silence(self, observed: Observed, sensors: SensorWatch) -> None:
         """What is not seen cannot be called fine."""

@@ -21,9 +21,7 @@ from probdmp.detection.path_model import PathModel
 from probdmp.detection.phase_clock import TICKS
 from probdmp.detection.trajectory_statistics import DEGREES_OF_FREEDOM
 
-__all__ = ["HELD", "LOOKED_AT", "Diagnosis", "diagnose"]
-
-HELD = "held"
+__all__ = ["LOOKED_AT", "Diagnosis", "diagnose"]
 
 REST_TICKS = (4, 8)
 """Ticks without movement that make a standstill: at the alarm, and once there was time to see."""
@@ -73,7 +71,7 @@ def diagnose(
     """
     n_rest = min(REST_TICKS[0] + seen_since, REST_TICKS[1])
     if _is_held(means, list(recent), tick, REST_EXTENT + 1.5 * noise_stds, n_rest):
-        return Diagnosis("timing", HELD)
+        return Diagnosis("timing", "held")
     back = np.array([j for j in LOOKED_AT if j < len(recent) and not np.isnan(recent[-1 - j]).any()], dtype=int)
     explanations = _explanations(int(back.max()) if len(back) else 0)
     if len(explanations.onsets) < 2:

@@ -64,14 +64,15 @@ class SensorWatch:
     @property
     def cause(self) -> str:
         """What is wrong, in a word or two; nothing if nothing is."""
-        if np.any(self.repeats > self._most_repeats):
+        # If nothing moves at all, whether by exact numbers or not, it is the movement that stands still.
+        if np.any(self.repeats > self._most_repeats) and not self._all_repeat:
             return "stuck"
         return "spikes" if self.spikes.sum() > MOST_SPIKES else ""
 
     @property
-    def all_repeat(self) -> bool:
-        """Whether every sensor gives the same number again and again."""
-        return bool(np.all(self.repeats > 0))
+    def _all_repeat(self) -> bool:
+        """Whether each of several sensors gives the same number again and again."""
+        return len(self.repeats) > 1 and bool(np.all(self.repeats > 0))
 
     @property
     def is_stale(self) -> bool:

@@ -57,7 +57,8 @@ def rate_over_classes(happened: Sequence[bool], labels: Sequence[str], n_splits:
     counts, sizes = np.bincount(classes, weights=np.asarray(happened, dtype=np.float64)), np.bincount(classes)
     count, n = int(counts.sum()), len(labels)
     if np.ptp(counts / sizes) == 0:
-        one_split = rate_of(round(count / n_splits), n // n_splits)
+        size = max(round(n / n_splits), 1)
+        one_split = rate_of(min(round(count / n_splits), size), size)
         return Rate(count, n, count / n, one_split.low, one_split.high)
     draws = np.random.default_rng(0).integers(len(sizes), size=(DRAWS, len(sizes)))
     rates = counts[draws].sum(axis=1) / sizes[draws].sum(axis=1)
