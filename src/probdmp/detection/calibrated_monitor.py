@@ -98,8 +98,8 @@ class CalibratedMonitor:
         if not self._verdict.failed:
             self._latch(observed, sensors.ratio, sensors.shares, "sensor")
         self._is_latched = True
-        found = {"kind": "sensor", "cause": sensors.cause, "better": ""}
-        self._verdict = replace(self._verdict, failed=True, has_sensor_fault=True, **found)
+        verdict = replace(self._verdict, kind="sensor", cause=sensors.cause, better="")
+        self._verdict = replace(verdict, failed=True, has_sensor_fault=True)
 
     def _note_silence(self, observed: Observed, sensors: SensorWatch) -> None:
         """What is not seen cannot be called fine."""
