@@ -43,7 +43,7 @@ class Script:
         cause = max((fault for t, fault in self.faults.items() if t <= self.t), default="")
         stale = self.t in self.stale
         return SimpleNamespace(
-            cause=cause, ratio=1.5, shares=np.array([0.0, 1.5]), staleness=1.5, is_stale=stale, all_repeat=self.repeats
+            cause=cause, ratio=1.5, shares=np.array([0.0, 1.5]), staleness=1.5, is_stale=stale
         )
 
 
