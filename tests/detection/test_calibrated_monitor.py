@@ -42,9 +42,7 @@ class Script:
     def sensors(self):
         cause = max((fault for t, fault in self.faults.items() if t <= self.t), default="")
         stale = self.t in self.stale
-        return SimpleNamespace(
-            cause=cause, ratio=1.5, shares=np.array([0.0, 1.5]), staleness=1.5, is_stale=stale
-        )
+        return SimpleNamespace(cause=cause, ratio=1.5, shares=np.array([0.0, 1.5]), staleness=1.5, is_stale=stale)
 
 
 CALIBRATION = Calibration(np.arange(1.0, 100.0)[:, None], ["a"] * 99, 0.05, "held_out")

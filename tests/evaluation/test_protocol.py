@@ -98,7 +98,7 @@ def test_the_document_has_what_is_promised(evaluation):
     assert {"detected", "ever", "latency_median", "latency_p95"} <= set(hold)
     assert set(hold["detected"]) == set(hold["ever"]) == rate
     assert hold["detected"]["n"] == document["false_alarms"]["n"] == 6
-    assert len(document["readings"]) == 4
+    assert len(document["readings"]) == 6
     assert set(document["by_class"]) == {"s", "v"}
     assert document["published"]["false_alarms"]["count"] == 2
 

@@ -126,4 +126,4 @@ def test_several_splits_have_intervals_over_classes():
 def test_the_first_reading_is_that_of_as_published():
     assert (READINGS[0].forcing_noise, READINGS[0].likelihood) == ("predictive", "per_step")
     assert READINGS[0].name == "predictive, per step"
-    assert len(set(READINGS)) == 4
+    assert len(set(READINGS)) == 6

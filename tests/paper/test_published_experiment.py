@@ -78,10 +78,12 @@ def test_intervals_are_exact(count, n):
     assert rate.high == pytest.approx(beta.ppf(0.975, count + 1, n - count) if count < n else 1.0)
 
 
-def test_the_four_readings():
+def test_the_six_readings():
     """What the paper leaves open: predictive variance with or without 1 / beta, likelihood of a step or of all so far."""
     assert set(READINGS) == {
-        Reading(noise, likelihood) for noise in ("predictive", "posterior") for likelihood in ("per_step", "cumulative")
+        Reading(noise, likelihood)
+        for noise in ("predictive", "posterior", "between")
+        for likelihood in ("per_step", "cumulative")
     }
     assert READINGS[0] == Reading("predictive", "per_step")
 

@@ -42,7 +42,7 @@ class Reading:
     """A way to understand what the paper leaves open."""
 
     forcing_noise: str
-    """`"predictive"` or `"posterior"`; see `probdmp.dmp.forcing_term`."""
+    """Whose variance: `"predictive"` or `"posterior"`, see `probdmp.dmp.forcing_term`; or `BETWEEN`."""
     likelihood: str
     """`"per_step"` or `"cumulative"`; see `probdmp.detection.statistics`."""
 
@@ -52,28 +52,36 @@ class Reading:
         return f"{self.forcing_noise}, {self.likelihood.replace('_', ' ')}"
 
 
+BETWEEN = "between"
+"""Sigma_w is how the weights of single demonstrations differ, not how well their mean is known; nothing scales with the goal."""
+
 READINGS = tuple(
-    Reading(noise, likelihood) for noise in ("predictive", "posterior") for likelihood in ("per_step", "cumulative")
+    Reading(noise, likelihood) for noise in ("predictive", "posterior", BETWEEN) for likelihood in ("per_step", "cumulative")
 )
 """All readings; the first is the one that `as_published` takes."""
 
 
 def fit_paper_detector(trial: Trial, reading: Reading, experiment: Experiment) -> tuple[Primitive, FailureDetector]:
     """Learn a class from its training demonstrations, and the paper's detector with the task knowledge of the experiment."""
-    primitive = learned_primitive(trial, replace(experiment.configuration_for("paper"), forcing_noise=reading.forcing_noise))
+    configuration, weight_model = experiment.configuration_for("paper"), "pooled"
+    if reading.forcing_noise == BETWEEN:
+        configuration, weight_model = replace(configuration, scaling="none"), "hierarchical"
+    else:
+        configuration = replace(configuration, forcing_noise=reading.forcing_noise)
+    primitive = learned_primitive(trial, configuration, weight_model)
     detector = FailureDetector(rule="paper", likelihood=reading.likelihood)
     tasks = commanded_tasks(primitive, trial.training, experiment.task)
     return primitive, detector.fit(primitive, trial.training, tasks=tasks)
 
 
-def learned_primitive(trial: Trial, configuration: Configuration) -> Primitive:
+def learned_primitive(trial: Trial, configuration: Configuration, weight_model: str = "pooled") -> Primitive:
     """The primitive that the training demonstrations teach; remembered, since several judges ask for the same."""
-    return _learned(tuple(trial.training), configuration)
+    return _learned(tuple(trial.training), configuration, weight_model)
 
 
 @lru_cache(maxsize=128)
-def _learned(training: tuple[Demonstration, ...], configuration: Configuration) -> Primitive:
-    return fit_primitive(training, configuration, LearningOptions())[0]
+def _learned(training: tuple[Demonstration, ...], configuration: Configuration, weight_model: str) -> Primitive:
+    return fit_primitive(training, configuration, LearningOptions(weight_model))[0]
 
 
 def shown_primitive(trial: Trial, experiment: Experiment) -> Primitive:
