@@ -53,7 +53,7 @@ class Reading:
 
 
 BETWEEN = "between"
-"""Sigma_w is how the weights of single demonstrations differ, not how well their mean is known; nothing scales with the goal."""
+"""Sigma_w is how the weights of single demonstrations differ, not how well their mean is known; nothing scales with goals."""
 
 READINGS = tuple(
     Reading(noise, likelihood) for noise in ("predictive", "posterior", BETWEEN) for likelihood in ("per_step", "cumulative")
