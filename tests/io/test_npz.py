@@ -288,7 +288,7 @@ def assert_refused_cheaply(path, match, most_bytes=3_000_000):
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    assert time.perf_counter() - begin < 1
+    assert time.perf_counter() - begin < 10
     assert peak < most_bytes
 
 
