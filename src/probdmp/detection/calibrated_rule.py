@@ -5,10 +5,8 @@ calibration for each. Unless tasks are given, both are made, from demonstrations
 """
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, fields
 from functools import cached_property
-from os import cpu_count
 from typing import Any, Protocol, Self
 
 import numpy as np
@@ -196,8 +194,8 @@ def _calibrate(
             raise TooFewDemonstrationsError("two or more demonstrations to leave one out", f"one of {label!r}", hint)
     judge = family.left_out_maxima if options.calibration == "leave_one_out" else family.maxima
     labels = list(library.members)
-    with ThreadPoolExecutor(cpu_count()) as pool:  # the linear algebra does not hold the interpreter's lock
-        found = list(pool.map(lambda label: judge(library.members[label], tasks[label]), labels))
+    # One after another: the linear algebra has threads of its own, and more of them get in each other's way.
+    found = [judge(library.members[label], tasks[label]) for label in labels]
     maxima = dict(zip(labels, found, strict=True))
     of_each = {label: [label] * len(values) for label, values in maxima.items()}
     if not options.pooled:
