@@ -42,7 +42,7 @@ detection: $(VENV)/.demo
 # Peers that the library is compared with live in an environment of their own.
 bench-env: $(BENCH)/.ready
 
-# Failure detectors against one another, on the recordings that PROBDMP_RECORDINGS points at; about five minutes.
+# Failure detectors against one another, on the recordings that PROBDMP_RECORDINGS points at.
 bench-detection: $(BENCH)/.ready
 	$(BENCH)/bin/python benchmarks/failure_detection.py "$(PROBDMP_RECORDINGS)/uci_letters/letters.npz"
 

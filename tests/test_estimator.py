@@ -224,6 +224,7 @@ def test_execute_with_a_detector(learned, letters):
         step = e.step(letters["s"][0].positions[0])
     assert e.failed
     assert e.verdict.cause == "held"
+    assert e.verdict.test_ratio > 1
     np.testing.assert_array_equal(step.velocity, 0)
 
 

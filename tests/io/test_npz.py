@@ -281,14 +281,14 @@ def zipped(path, members, compression=zipfile.ZIP_STORED):
 
 def assert_refused_cheaply(path, match, most_bytes=3_000_000):
     tracemalloc.start()
-    begin = time.perf_counter()
+    begin = time.process_time()  # what others do on the machine is no cost of reading
     try:
         with pytest.raises(DataFileError, match=match):
             read_npz(path)
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    assert time.perf_counter() - begin < 10
+    assert time.process_time() - begin < 1
     assert peak < most_bytes
 
 

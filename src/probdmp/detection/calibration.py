@@ -104,13 +104,13 @@ class Calibration:
     @cached_property
     def suspects(self) -> dict[str, float]:
         """Primitives that may raise more alarms than the others: label to the share of its executions in the common tail."""
-        from scipy.stats import binom
+        from scipy.special import bdtrc
 
         share = max(self.false_alarm_rate, SUSPICIOUS_SHARE)
         level = np.quantile(self.statistics, 1 - share)
         alarms = Counter(label for label, t in zip(self.labels, self.statistics, strict=True) if t > level)
         counts = Counter(self.labels)
-        chance = {label: binom.sf(k - 1, counts[label], share) for label, k in alarms.items()}
+        chance = {label: float(bdtrc(k - 1, counts[label], share)) for label, k in alarms.items()}
         return {label: alarms[label] / counts[label] for label in sorted(alarms) if chance[label] < SUSPECT}
 
     @cached_property

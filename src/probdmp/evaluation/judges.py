@@ -105,17 +105,10 @@ def _judge_by_paper(reading: Reading, trials: Sequence[Trial], experiment: Exper
     return Assessment(outcomes)
 
 
-def judge_by_calibrated(
-    trials: Sequence[Trial], experiment: Experiment, on_class: Progress, **parameters: object
-) -> Assessment:
-    """The calibrated detector: every class taught with its variation, all of them calibrated together.
-
-    Parameters
-    ----------
-    parameters : of `FailureDetector`, to see what they do.
-    """
+def judge_by_calibrated(trials: Sequence[Trial], experiment: Experiment, on_class: Progress) -> Assessment:
+    """The calibrated detector: every class taught with its variation, all of them calibrated together."""
     primitives = {trial.label: _varied_primitive(trial, experiment) for trial in trials}
-    detector = FailureDetector(experiment.false_alarm_rate, **parameters)  # type: ignore[arg-type]
+    detector = FailureDetector(experiment.false_alarm_rate)
     asked = {t.label: commanded_tasks(primitives[t.label], t.training, experiment.task) for t in trials}
     detector.fit(primitives, {trial.label: trial.training for trial in trials}, tasks=asked)
     outcomes: list[Outcome] = []
