@@ -162,11 +162,10 @@ def test_a_movement_at_another_time_is_judged_alike(detector, executions, learne
     same(*verdicts)
 
 
-def test_the_level_is_twice_the_minimum(detector, learned, library):
-    (threshold,) = detector.rule_.thresholds.values()
-    assert detector.paper_level(learned.primitive_) == threshold.level
-    with pytest.raises(InputError, match='a detector with rule="paper" that was fitted to this primitive'):
-        detector.paper_level(library["a"].primitive_)
+def test_the_level_is_twice_the_minimum(detector, learned):
+    threshold = detector.thresholds_[learned.primitive_.identity]
+    assert set(detector.thresholds_) == {learned.primitive_.identity}
+    assert threshold.level == threshold.minimum - abs(threshold.minimum)
 
 
 # --- missing data -----------------------------------------------------------------------------------------------------
@@ -360,7 +359,7 @@ def test_unfitted(learned, letters):
         lambda: detector.predict(letters["s"]),
         lambda: detector.verdicts(letters["s"]),
         lambda: detector.monitor(learned.primitive_, task_for(learned.primitive_), 0.02),
-        lambda: detector.paper_level(learned.primitive_),
+        lambda: detector.thresholds_,
         lambda: learned.execute(detector=detector),
         detector.state,
     ):

@@ -154,13 +154,6 @@ class FailureDetector:
         """(N,) array: +1 for a fine execution, -1 for a failed one; arguments as in `verdicts`."""
         return np.array([-1 if verdict.failed else 1 for verdict in self.verdicts(executions, dt, tasks)], dtype=np.int64)
 
-    def paper_level(self, primitive: Primitive) -> float:
-        """The log-likelihood, nats, below which the paper's rule calls an execution of a primitive failed."""
-        rule = self._fitted()
-        if not isinstance(rule, PaperRule) or primitive.identity not in rule.thresholds:
-            raise InputError('a detector with rule="paper" that was fitted to this primitive', repr(self.rule))
-        return rule.thresholds[primitive.identity].level
-
     def state(self) -> dict[str, Any]:
         """What a model file keeps, as plain values."""
         return {"rule": self.rule, **self._fitted().state()}
