@@ -5,9 +5,10 @@ from scipy.special import logsumexp
 from scipy.stats import multivariate_normal, multivariate_t
 from strategies import random_covariance
 
+from probdmp.detection.evidence import DEGREES_OF_FREEDOM, REST_STD, SLOWED, Pace, Standstill
 from probdmp.detection.path_model import PathModel
 from probdmp.detection.phase_clock import TICKS
-from probdmp.detection.trajectory_statistics import AHEAD, BEFORE, DEGREES_OF_FREEDOM, FORECAST_SHIFTS, REST_STD, SHIFT_STD
+from probdmp.detection.trajectory_statistics import SHIFT_STD
 
 PHASES = np.linspace(0.0, 1.0, TICKS + 1)
 WAVES = np.sin(np.pi / 2 * PHASES[:, None] * np.arange(1, 7))
@@ -54,15 +55,15 @@ def window_model(model, place, offsets, shift, means, combination=None):
     return mix @ means[ticks].ravel(), mix @ covariance @ mix.T
 
 
-def log_t_mixture(model, place, offsets, window, means):
+def log_t_mixture(model, place, offsets, window, means, shifts):
     """ln of the mixture over shifts of multivariate t densities of a window (P, D), what was not seen integrated out."""
     x = window.ravel()
     seen = ~np.isnan(x)
-    weights = np.exp(-((FORECAST_SHIFTS / SHIFT_STD) ** 2) / 2)
+    weights = np.exp(-((shifts / SHIFT_STD) ** 2) / 2)
     if not seen.any():
         return 0.0
     terms = []
-    for shift, weight in zip(FORECAST_SHIFTS, weights / weights.sum(), strict=True):
+    for shift, weight in zip(shifts, weights / weights.sum(), strict=True):
         mean, covariance = window_model(model, place, offsets[: len(window)], shift, means)
         density = multivariate_t(mean[seen], covariance[np.ix_(seen, seen)], df=DEGREES_OF_FREEDOM)
         terms.append(np.log(weight) + density.logpdf(x[seen]))
@@ -78,10 +79,24 @@ def log_at_rest(model, since):
     return float(multivariate_normal(np.zeros(moved.size), covariance).logpdf(moved.ravel()))
 
 
+def seen_from(kind, path, place, n_ahead):
+    """The window (P, D) of a kind of evidence with the first n_ahead points ahead, and the offsets of its points."""
+    offsets = np.concatenate([-kind.before, kind.ahead[:n_ahead]])
+    return path[np.maximum(place + offsets, 0)], offsets
+
+
 def standstill(model, path, place, n_ahead, means):
     """ln p(at rest since the place) / p(gone on | all before) from the first n_ahead points."""
-    offsets = np.concatenate([-BEFORE, AHEAD])[: len(BEFORE) + n_ahead]
-    window = path[np.maximum(place + offsets, 0)]
-    together = log_t_mixture(model, place, offsets, window, means)
-    before = log_t_mixture(model, place, offsets, window[: len(BEFORE)], means)
-    return log_at_rest(model, window[len(BEFORE) - 1 :]) - (together - before)
+    window, offsets = seen_from(Standstill, path, place, n_ahead)
+    n_before = len(Standstill.before)
+    together = log_t_mixture(model, place, offsets, window, means, Standstill.shifts)
+    before = log_t_mixture(model, place, offsets, window[:n_before], means, Standstill.shifts)
+    return log_at_rest(model, window[n_before - 1 :]) - (together - before)
+
+
+def slowed(model, path, place, n_ahead, means):
+    """ln p(at half speed since the place | all before) / p(gone on | all before) from the first n_ahead points."""
+    window, offsets = seen_from(Pace, path, place, n_ahead)
+    slow = np.where(offsets > 0, offsets * SLOWED, offsets).round().astype(int)
+    densities = (log_t_mixture(model, place, model_at, window, means, Pace.shifts) for model_at in (slow, offsets))
+    return next(densities) - next(densities)

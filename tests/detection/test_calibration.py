@@ -168,6 +168,18 @@ def test_a_primitive_that_is_really_worse_is_suspected():
     assert found.threshold_for("a") == found.threshold
 
 
+def test_a_primitive_that_ranks_higher_throughout_is_suspected_even_if_none_of_its_executions_is_extreme():
+    rng = np.random.default_rng(4)
+    labels = [letter for letter in "abcdefghij" for _ in range(10)]
+    maxima = np.sort(executions(rng, 100), axis=0)
+    maxima = np.concatenate([maxima[:60], maxima[80:], maxima[60:80]])[rng.permutation(100)]
+    ranked = np.argsort(calibration(maxima, 0.05, labels=labels).statistics)
+    maxima[[*range(10), *ranked[75:85]]] = maxima[[*ranked[75:85], *range(10)]]  # a: high, but not among the highest tenth
+    found = calibration(maxima, 0.05, labels=labels)
+    assert not (found.statistics[:10] > np.quantile(found.statistics, 0.9)).any()
+    assert found.suspects["a"] == 0
+
+
 def test_primitives_that_are_alike_are_rarely_suspected():
     rng, labels = np.random.default_rng(3), [letter for letter in "abcdefghij" for _ in range(10)]
     suspects = [len(calibration(executions(rng, 100), 0.05, labels=labels).suspects) for _ in range(50)]

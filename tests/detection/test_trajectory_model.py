@@ -7,9 +7,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from strategies import seeds
 
+from probdmp.detection.evidence import EVIDENCE
 from probdmp.detection.trajectory_family import values_of
-from probdmp.detection.trajectory_model import LARGEST_LOG_RATIO, TrajectoryModel, as_suspicion
-from probdmp.detection.trajectory_statistics import CHANNELS, HORIZONS, LAST_STANDSTILL, MEMORY
+from probdmp.detection.trajectory_model import (
+    CHANNELS,
+    FLOORS,
+    HANDICAPS,
+    LARGEST_LOG_RATIO,
+    MEMORY,
+    TrajectoryModel,
+    as_suspicion,
+)
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +32,7 @@ def followed(trajectory, path, goal):
 
 
 @settings(max_examples=10)
-@given(seeds, st.sampled_from([0, 1, 2]), st.sampled_from([1, 5, 93, 130]), st.booleans(), st.booleans())
+@given(seeds, st.sampled_from([0, 1, 2]), st.sampled_from([1, 5, 93, 130, 160]), st.booleans(), st.booleans())
 def test_tick_by_tick_is_side_by_side(trajectories, seed, d, length, gaps, told):
     trajectory, rng = trajectories[d], np.random.default_rng(seed)
     paths = random_paths(trajectory.model, rng, 2, length)
@@ -58,14 +66,17 @@ def test_paths_of_different_lengths_do_not_hear_of_each_other(trajectories):
 
 
 def test_each_channel_speaks_when_it_can(trajectories):
-    """Where an execution is from the start on; a standstill from its horizon until the movement may be ending."""
+    """Where an execution is from the start on; the others from their horizon until the movement may be ending, or has ended."""
     trajectory = trajectories[1]
-    values = trajectory.values(random_paths(trajectory.model, np.random.default_rng(0), 1, 130), np.full((1, 2), np.nan))[0]
+    values = trajectory.values(random_paths(trajectory.model, np.random.default_rng(0), 1, 170), np.full((1, 2), np.nan))[0]
     spoken = ~np.isnan(values)
     assert spoken[:, :2].all()
-    for channel, horizon in enumerate(HORIZONS, start=2):
-        assert CHANNELS[channel] == f"standstill_{horizon}"
-        np.testing.assert_array_equal(np.flatnonzero(spoken[:, channel]), np.arange(horizon, LAST_STANDSTILL))
+    asked = [(kind, horizon) for kind in EVIDENCE for horizon in kind.horizons]
+    assert len(CHANNELS) == len(FLOORS) == len(HANDICAPS) == 2 + len(asked)
+    for channel, (kind, horizon) in enumerate(asked, start=2):
+        assert CHANNELS[channel] == f"{kind.name}_{horizon}"
+        assert horizon in kind.ahead
+        np.testing.assert_array_equal(np.flatnonzero(spoken[:, channel]), np.arange(horizon, kind.last + 1))
 
 
 def test_memory_is_bounded(trajectories):

@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
-from detection.paths import random_path_model, random_paths, standstill, window_model, with_gaps
+from detection.paths import random_path_model, random_paths, window_model
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from strategies import seeds
 
 from probdmp.detection.phase_clock import TICKS
 from probdmp.detection.trajectory_statistics import (
-    AHEAD,
     DISPLACEMENT_SHIFTS,
     LAGS,
     ORDINARY_SQUARE,
@@ -17,57 +16,10 @@ from probdmp.detection.trajectory_statistics import (
     SHIFT_STD,
     SLOPPINESS_DELAY,
     Displacement,
-    Forecast,
     Position,
     relative_to_sloppiness,
 )
 from probdmp.detection.windows import gather
-
-
-@settings(max_examples=10)
-@given(seeds, st.booleans())
-def test_the_forecast_is_the_log_ratio_of_rest_to_going_on(seed, gaps):
-    """Multivariate t, mixed over shifts of tempo, against a Gaussian at rest; what was not seen before is integrated out."""
-    rng = np.random.default_rng(seed)
-    model = random_path_model(rng, int(rng.integers(1, 3)))
-    paths = random_paths(model, rng, 1, 130)
-    places = np.array([0, 9, 50, 92])
-    if gaps:
-        before = with_gaps(paths, rng, 0.1)
-        for place in places:  # the place itself and what follows are seen
-            before[:, [place, *(place + AHEAD)]] = paths[:, [place, *(place + AHEAD)]]
-        paths = before
-    means = model.means_for(rng.standard_normal((1, model.means.shape[1])))
-    evidence = Forecast(model).judge(places, gather(paths, places, Forecast.offsets), means)
-    for t, place in enumerate(places):
-        for n_ahead in (1, 4, len(AHEAD)):
-            expected = standstill(model, paths[0], int(place), n_ahead, means[0])
-            assert evidence[0, t, n_ahead - 1] == pytest.approx(expected, rel=1e-6, abs=1e-6)
-
-
-def test_what_is_not_seen_is_no_evidence_but_what_came_before_it_still_is():
-    rng = np.random.default_rng(1)
-    model = random_path_model(rng, 2)
-    paths, place = random_paths(model, rng, 1, 100), np.array([40])
-    whole = Forecast(model).judge(place, gather(paths, place, Forecast.offsets), model.means[None])[0, 0]
-    paths[:, 40 + AHEAD[5], 0] = np.nan
-    lost = Forecast(model).judge(place, gather(paths, place, Forecast.offsets), model.means[None])[0, 0]
-    np.testing.assert_allclose(lost[:5], whole[:5], rtol=1e-9)
-    assert np.isnan(lost[5:]).all()
-
-
-def test_standing_still_is_evidence_for_rest_and_going_on_is_not():
-    rng = np.random.default_rng(2)
-    model = random_path_model(rng, 2)
-    going = random_paths(model, rng, 20, 100)
-    held = np.array(going)
-    held[:, 40:] = going[:, 40:41] + rng.standard_normal(held[:, 40:].shape) * np.sqrt(model.noise_variances)
-    place = np.array([40])
-    forecast, means = Forecast(model), np.repeat(model.means[None], 20, axis=0)
-    at_rest, gone_on = (forecast.judge(place, gather(p, place, Forecast.offsets), means)[:, 0, -1] for p in (held, going))
-    assert np.all(at_rest > gone_on)
-    assert np.mean(at_rest > 0) >= 0.9
-    assert np.mean(gone_on < 0) >= 0.9
 
 
 @settings(max_examples=10)

@@ -7,7 +7,8 @@
     threshold                            h with a share alpha of executions whose largest T_i exceeds it
 
 Some primitives vary more than the model says and would take more than their share of the false alarms. One with more executions
-among the most surprising tenth than chance explains is a suspect; its threshold is no lower than its own largest T_i.
+among the most surprising tenth than chance explains is a suspect, and so is one whose T_i rank higher than chance explains
+(rank-sum); its threshold is no lower than its own largest T_i.
 
 alpha counts executions, not ticks. With alpha (n + 1) >= 5 the threshold is an order statistic of the n values T_i
 (conformal); below that it lies on an exponential tail fitted to those above their 80 % quantile. n executions can show no
@@ -16,12 +17,12 @@ Sources: Vovk, Gammerman & Shafer, Algorithmic Learning in a Random World; Hill,
 """
 
 from bisect import bisect_left
-from collections import Counter
 from collections.abc import Sequence
 from functools import cached_property
 from math import log
 
 import numpy as np
+from numpy.typing import NDArray
 
 from probdmp.checks import FloatArray
 from probdmp.errors import InputError
@@ -31,8 +32,9 @@ __all__ = ["CALIBRATIONS", "Calibration"]
 CALIBRATIONS = ("leave_one_out", "held_out")
 TAIL_SHARE = 0.1
 """Of the executions, in the tail of each channel."""
-TAIL_PRIOR = 0.1
-"""Exponent z of one execution that is taken to lie in the tail of every channel beside those that do."""
+TAIL_PRIOR, TAIL_PRIOR_COUNT = 0.2, 5
+"""Exponent z of so many executions that are taken to lie in the tail of every channel beside those that do: a few of them may
+be one wild one."""
 STATISTIC_TAIL_SHARE = 0.2
 ENOUGH = 5.0
 """Calibration executions expected above a threshold that is one of them."""
@@ -40,7 +42,7 @@ ROUNDING = 1e-9
 SUSPICIOUS_SHARE = 0.1
 """The most surprising executions of all; those of one primitive should not be many among them."""
 SUSPECT = 0.1
-"""A primitive is flagged where chance alone would give it so many of them less often than this."""
+"""A primitive is flagged where chance alone would do so less often than this, by either of two tests."""
 
 
 class Calibration:
@@ -77,7 +79,7 @@ class Calibration:
         self._starts = np.maximum(np.quantile(self.maxima, 1 - TAIL_SHARE, axis=0), least)
         beyond = self.maxima > self._starts
         excesses = np.where(beyond, np.log(np.maximum(self.maxima, self._starts) / self._starts), 0.0)
-        self._exponents = (excesses.sum(axis=0) + TAIL_PRIOR) / (beyond.sum(axis=0) + 1)
+        self._exponents = (excesses.sum(axis=0) + TAIL_PRIOR_COUNT * TAIL_PRIOR) / (beyond.sum(axis=0) + TAIL_PRIOR_COUNT)
         self._tail_surprises = -np.log((beyond.sum(axis=0) + 1) / (self.n + 1))
         self.statistics = self.surprise(self.maxima).max(axis=-1)
         self.threshold, self.is_conformal = self._threshold()
@@ -104,14 +106,14 @@ class Calibration:
     @cached_property
     def suspects(self) -> dict[str, float]:
         """Primitives that may raise more alarms than the others: label to the share of its executions in the common tail."""
-        from scipy.special import bdtrc
-
         share = max(self.false_alarm_rate, SUSPICIOUS_SHARE)
-        level = np.quantile(self.statistics, 1 - share)
-        alarms = Counter(label for label, t in zip(self.labels, self.statistics, strict=True) if t > level)
-        counts = Counter(self.labels)
-        chance = {label: float(bdtrc(k - 1, counts[label], share)) for label, k in alarms.items()}
-        return {label: alarms[label] / counts[label] for label in sorted(alarms) if chance[label] < SUSPECT}
+        in_tail = self.statistics > np.quantile(self.statistics, 1 - share)
+        of_each = {label: np.array([own == label for own in self.labels]) for label in sorted(set(self.labels))}
+        chances = {
+            label: min(self._chance_in_tail(own & in_tail, own, share), self._chance_of_ranks(own))
+            for label, own in of_each.items()
+        }
+        return {label: float(in_tail[own].mean()) for label, own in of_each.items() if chances[label] < SUSPECT / 2}
 
     @cached_property
     def own_thresholds(self) -> dict[str, float]:
@@ -148,6 +150,25 @@ class Calibration:
             return float(self._tail_surprises[channel] + log(value / start) / self._exponents[channel])
         above = self.n - (bisect_left(self._ranked[channel], value) if value > 0 else 0)
         return float(min(-log((above + 1) / (self.n + 1)), self._tail_surprises[channel]))
+
+    @staticmethod
+    def _chance_in_tail(above: NDArray[np.bool_], own: NDArray[np.bool_], share: float) -> float:
+        """Probability that so many of the own executions are among the most surprising share of all."""
+        from scipy.special import bdtrc
+
+        return float(bdtrc(above.sum() - 1, own.sum(), share)) if above.any() else 1.0
+
+    def _chance_of_ranks(self, own: NDArray[np.bool_]) -> float:
+        """Probability that the own executions rank so high among all, by the normal limit of the rank sum."""
+        from scipy.special import ndtr
+
+        count, ordered = int(own.sum()), np.sort(self.statistics)
+        others = self.n - count
+        if not others:
+            return 1.0
+        ranks = (np.searchsorted(ordered, self.statistics, "left") + np.searchsorted(ordered, self.statistics, "right") + 1) / 2
+        excess = ranks[own].sum() - count * (self.n + 1) / 2
+        return float(ndtr(-excess / np.sqrt(count * others * (self.n + 1) / 12)))
 
     def _threshold(self) -> tuple[float, bool]:
         alpha, ordered = self.false_alarm_rate, np.sort(self.statistics)

@@ -6,10 +6,10 @@ from math import lgamma, log, pi
 import numpy as np
 
 from probdmp.checks import FloatArray
+from probdmp.detection.evidence import DEGREES_OF_FREEDOM
 from probdmp.detection.path_model import PathModel, path_model
 from probdmp.detection.phase_clock import TICKS
 from probdmp.detection.profile import ExecutionProfile
-from probdmp.detection.trajectory_statistics import DEGREES_OF_FREEDOM
 from probdmp.dmp import Primitive
 
 __all__ = ["Candidate", "Comparison"]

@@ -17,9 +17,9 @@ from typing import NamedTuple
 import numpy as np
 
 from probdmp.checks import FloatArray
+from probdmp.detection.evidence import DEGREES_OF_FREEDOM
 from probdmp.detection.path_model import PathModel
 from probdmp.detection.phase_clock import TICKS
-from probdmp.detection.trajectory_statistics import DEGREES_OF_FREEDOM
 
 __all__ = ["LOOKED_AT", "Diagnosis", "diagnose"]
 

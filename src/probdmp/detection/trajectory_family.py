@@ -13,9 +13,8 @@ from probdmp.detection.execution_ticks import ticks_of_recording
 from probdmp.detection.library import Library, Member
 from probdmp.detection.path_model import path_model
 from probdmp.detection.profile import ExecutionProfile
-from probdmp.detection.trajectory_model import TrajectoryModel
+from probdmp.detection.trajectory_model import CHANNELS, FLOORS, HANDICAPS, TrajectoryModel
 from probdmp.detection.trajectory_source import Expectation, TrajectorySource
-from probdmp.detection.trajectory_statistics import CHANNELS, FLOORS, HANDICAPS
 from probdmp.dmp import Primitive, Task, Variation
 from probdmp.dmp.phase import phases_at
 from probdmp.errors import InputError

@@ -1,33 +1,49 @@
 """All channels of the trajectory together, over recordings side by side or tick by tick."""
 
 from collections import deque
+from itertools import groupby
+from operator import attrgetter
+from typing import NamedTuple
 
 import numpy as np
 
 from probdmp.checks import FloatArray, IntArray
+from probdmp.detection.evidence import EVIDENCE, Evidence
 from probdmp.detection.path_model import PathModel
 from probdmp.detection.trajectory_statistics import (
-    AHEAD,
-    BEFORE,
-    CHANNELS,
-    HORIZONS,
-    LAST_STANDSTILL,
-    MEMORY,
     SLOPPINESS_DELAY,
     Displacement,
-    Forecast,
     Position,
     relative_to_sloppiness,
     sloppiness,
 )
 from probdmp.detection.windows import gather
 
-__all__ = ["TrajectoryFollower", "TrajectoryModel", "as_suspicion"]
+__all__ = ["CHANNELS", "FLOORS", "HANDICAPS", "MEMORY", "TrajectoryFollower", "TrajectoryModel", "as_suspicion"]
+
+CHANNELS = ("position", "displacement", *(f"{kind.name}_{horizon}" for kind in EVIDENCE for horizon in kind.horizons))
+FLOORS = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0])
+"""Values up to which a channel is not suspicious: a standstill has to be likelier than its contrary."""
+HANDICAPS = np.array([2.0, 0.0, 1.0, 1.0, 1.0, 1.0, 2.0])
+"""Nats of surprise by which a channel stands back behind displacement. What the others are for, a movement that ends elsewhere
+or stands still, becomes plain sooner or later; a push passes, and the false alarms that may be had are better spent on it."""
+MEMORY = max(int(kind.before.max()) + max(kind.horizons) for kind in EVIDENCE) + 1
+"""Ticks that have to be remembered while executing."""
 
 LARGEST_LOG_RATIO = 500.0
 EVIDENCE_SCALE = 10.0
-"""Nats of evidence for a standstill that multiply the value of its channel by e."""
-POINTS_AHEAD = tuple(int(np.flatnonzero(horizon == AHEAD)[0]) for horizon in HORIZONS)
+"""Nats of evidence that multiply the value of a channel by e."""
+
+
+class Horizon(NamedTuple):
+    """A channel that asks what has happened since a place some ticks ago."""
+
+    channel: int
+    evidence: Evidence
+    ticks: int
+    """Since the place."""
+    offsets: IntArray
+    """Ticks of the points that it looks at, relative to the place; the last is now."""
 
 
 class TrajectoryModel:
@@ -40,7 +56,13 @@ class TrajectoryModel:
 
     def __init__(self, model: PathModel) -> None:
         self.model = model
-        self.position, self.displacement, self.forecast = Position(model), Displacement(model), Forecast(model)
+        self.position, self.displacement = Position(model), Displacement(model)
+        questions = [(evidence, ticks) for evidence in [kind(model) for kind in EVIDENCE] for ticks in evidence.horizons]
+        self.horizons = tuple(
+            Horizon(channel, evidence, ticks, np.concatenate([-evidence.before, evidence.ahead[evidence.ahead <= ticks]]))
+            for channel, (evidence, ticks) in enumerate(questions, start=2)
+        )
+        """The channels after position and displacement."""
 
     def values(self, paths: FloatArray, goals: FloatArray) -> FloatArray:
         """Every channel at every tick, NaN where there is no evidence.
@@ -60,11 +82,13 @@ class TrajectoryModel:
         values[..., 0] = self.position.judge(ticks, gather(paths, ticks, Position.offsets), means)
         squares = self.displacement.judge(ticks, gather(paths, ticks, Displacement.offsets), means)
         values[..., 1] = relative_to_sloppiness(squares)
-        places = np.arange(min(length, LAST_STANDSTILL))
-        evidence = self.forecast.judge(places, gather(paths, places, Forecast.offsets), means)
-        for channel, (horizon, point) in enumerate(zip(HORIZONS, POINTS_AHEAD, strict=True), start=2):
-            judged = max(len(places) - horizon, 0)
-            values[:, horizon : horizon + judged, channel] = as_suspicion(evidence[:, :judged, point])
+        for evidence, horizons in groupby(self.horizons, key=attrgetter("evidence")):
+            places = np.arange(max(min(length, evidence.last + 1) - evidence.horizons[0], 0))
+            found = evidence.judge(places, gather(paths, places, np.concatenate([-evidence.before, evidence.ahead])), means)
+            for horizon in horizons:
+                judged = max(min(length, evidence.last + 1) - horizon.ticks, 0)
+                point = len(horizon.offsets) - len(evidence.before) - 1
+                values[:, horizon.ticks : horizon.ticks + judged, horizon.channel] = as_suspicion(found[:, :judged, point])
         return values
 
     def follow(self, goal: FloatArray) -> "TrajectoryFollower":
@@ -92,12 +116,11 @@ class TrajectoryFollower:
         values[0] = trajectory.position.judge(here, self.window(self._tick, Position.offsets), self._means)[0, 0]
         window = self.window(self._tick, Displacement.offsets)
         values[1] = self._relative(float(trajectory.displacement.judge(here, window, self._means)[0, 0]))
-        for channel, (horizon, point) in enumerate(zip(HORIZONS, POINTS_AHEAD, strict=True), start=2):
-            place = self._tick - horizon
-            if place >= 0 and self._tick < LAST_STANDSTILL:
-                window = self.window(place, Forecast.offsets[: len(BEFORE) + point + 1])
-                evidence = trajectory.forecast.judge(np.array([place]), window, self._means)
-                values[channel] = as_suspicion(evidence[0, 0, point])
+        for channel, evidence, ticks, offsets in trajectory.horizons:
+            place = self._tick - ticks
+            if place >= 0 and self._tick <= evidence.last:
+                found = evidence.judge(np.array([place]), self.window(place, offsets), self._means)
+                values[channel] = as_suspicion(found[0, 0, -1])
         return values
 
     def remember(self, displacement: FloatArray) -> None:

@@ -12,8 +12,8 @@ from probdmp.detection.execution_ticks import ExecutionTicks
 from probdmp.detection.phase_clock import TICKS
 from probdmp.detection.profile import ExecutionProfile
 from probdmp.detection.sensor_watch import SensorWatch
-from probdmp.detection.trajectory_model import TrajectoryFollower, TrajectoryModel
-from probdmp.detection.trajectory_statistics import CHANNELS, Displacement, Position
+from probdmp.detection.trajectory_model import CHANNELS, TrajectoryFollower, TrajectoryModel
+from probdmp.detection.trajectory_statistics import Displacement, Position
 from probdmp.dmp import Primitive, Task
 from probdmp.execution import Observed
 

@@ -14,7 +14,7 @@ from probdmp.checks import FloatArray, IntArray
 from probdmp.detection.path_model import PathModel
 from probdmp.detection.phase_clock import TICKS
 
-__all__ = ["PathWindows", "WhiteWindows", "gather"]
+__all__ = ["PathWindows", "WhiteWindows", "gather", "inverse_of_cholesky"]
 
 
 class WhiteWindows(NamedTuple):
@@ -33,13 +33,25 @@ def gather(paths: FloatArray, places: IntArray, offsets: IntArray) -> FloatArray
     return paths[:, np.clip(places[:, None] + offsets, 0, paths.shape[1] - 1)]
 
 
+def inverse_of_cholesky(covariances: FloatArray) -> FloatArray:
+    """L^-1 of positive definite matrices L L^T (…, n, n), by forward substitution on all of them at once."""
+    factors = np.linalg.cholesky(covariances)
+    inverses = np.zeros_like(covariances)
+    for i in range(covariances.shape[-1]):
+        scale = 1 / factors[..., i, i]
+        inverses[..., i, i] = scale
+        above = np.matmul(factors[..., i, None, :i], inverses[..., :i, :i])[..., 0, :]
+        inverses[..., i, :i] = -scale[..., None] * above
+    return inverses
+
+
 class PathWindows:
     """Windows of one shape at every place of a movement.
 
     Parameters
     ----------
     model : the Gaussian over paths.
-    offsets : (P,) ticks of the points, relative to the place.
+    offsets : (P,) ticks of the model at which the points should be, relative to the place.
     shifts : (S,) ticks by which an execution may be ahead.
     n_places : places 0, 1, …; a later one is judged as the last.
     combination : (L, P) array, from points to what is compared; the points themselves unless given.
@@ -49,26 +61,30 @@ class PathWindows:
         self, model: PathModel, offsets: IntArray, shifts: IntArray, n_places: int, combination: FloatArray | None = None
     ) -> None:
         self.offsets, self.shifts = np.asarray(offsets), np.asarray(shifts)
-        self._combination = np.eye(len(self.offsets)) if combination is None else combination
+        self._combination = combination
         ticks = np.arange(n_places)[:, None, None] + self.offsets
         # Before the start there is no tempo: (T, S, P)
         self._ticks = np.where(ticks <= 0, 0, np.clip(ticks + self.shifts[:, None], 0, TICKS))
-        self._whole = model.covariance.transpose(0, 2, 1, 3)  # (M, M, D, D)
-        self._noise = np.kron(self._combination @ self._combination.T, np.diag(model.noise_variances))
-        self._whitening = np.linalg.inv(np.linalg.cholesky(self._covariances(self._ticks)))
+        n_ticks, self._dof = model.means.shape
+        self._whole = model.covariance.reshape(n_ticks * self._dof, -1)
+        self._noise = np.diag(np.tile(model.noise_variances, len(self.offsets)))
+        self._whitening = inverse_of_cholesky(self._covariances(self._ticks))
 
     def _covariances(self, ticks: IntArray) -> FloatArray:
         """Of windows at ticks (…, S, P) of the movement, noise included: (…, S, L D, L D) array."""
-        blocks = self._whole[ticks[..., :, None], ticks[..., None, :]]  # (…, P, P, D, D)
-        mixed = np.einsum("lp,...pqde,kq->...ldke", self._combination, blocks, self._combination, optimize=True)
-        return np.asarray(mixed.reshape(*ticks.shape[:-1], *self._noise.shape) + self._noise)
+        rows = (ticks[..., None] * self._dof + np.arange(self._dof)).reshape(*ticks.shape[:-1], -1)
+        covariances = self._whole[rows[..., :, None], rows[..., None, :]] + self._noise
+        if self._combination is None:
+            return covariances
+        combination = np.kron(self._combination, np.eye(self._dof))
+        return np.asarray(combination @ covariances @ combination.T)
 
     def whiten(self, places: IntArray, windows: FloatArray, means: FloatArray) -> WhiteWindows:
         """Compare windows with the model.
 
         Parameters
         ----------
-        places : (T,) ticks.
+        places : (T,) ticks; one beyond the last place is judged as the last.
         windows : (n, T, P, D) array of displacements; NaN where nothing was seen. Where points are compared, not differences,
             the first few suffice.
         means : (n, M, D) array, mean paths of the executions.
@@ -76,7 +92,8 @@ class PathWindows:
         rows = np.minimum(places, len(self._ticks) - 1)
         residuals = self._residuals(rows, windows, means)
         points, dof = residuals.shape[-2:]
-        flat, size = residuals.reshape(*residuals.shape[:3], -1), points * dof
+        size = points * dof
+        flat = residuals.reshape(*residuals.shape[:3], size)
         whitening = self._whitening[rows][..., :size, :size]
         # (T, S, n, size): matrix products are far faster than sums over indices
         white = np.moveaxis(np.matmul(whitening, np.moveaxis(np.nan_to_num(flat), 0, -1)), -1, 0)
@@ -104,21 +121,21 @@ class PathWindows:
     def _residuals(self, rows: IntArray, windows: FloatArray, means: FloatArray) -> FloatArray:
         """What is compared minus its mean at each shift, (n, T, S, L, D)."""
         points = windows.shape[2]
-        combination = self._combination if points == len(self.offsets) else np.eye(points)
-        deviations = windows[:, :, None] - means[:, self._ticks[rows][..., :points]]  # (n, T, S, P, D)
+        deviations = np.asarray(windows[:, :, None] - means[:, self._ticks[rows][..., :points]])  # (n, T, S, P, D)
+        if self._combination is None:
+            return deviations
         if not np.isnan(windows).any():
-            return np.asarray(np.matmul(combination, deviations))
-        unseen = np.matmul(np.abs(combination), np.isnan(deviations)) > 0
-        return np.where(unseen, np.nan, np.matmul(combination, np.nan_to_num(deviations)))
+            return np.asarray(np.matmul(self._combination, deviations))
+        unseen = np.matmul(np.abs(self._combination), np.isnan(deviations)) > 0
+        return np.where(unseen, np.nan, np.matmul(self._combination, np.nan_to_num(deviations)))
 
     def _without_unseen(self, row: int, residuals: FloatArray, size: int) -> tuple[FloatArray, FloatArray]:
         """What was seen of a window whitened by itself: z and the logarithms of the diagonal, (S, size), zero elsewhere."""
         seen = ~np.isnan(residuals[0])
         white, diagonal = np.zeros((2, len(self.shifts), size))
         if seen.any():
-            inverse = np.linalg.inv(
-                np.linalg.cholesky(self._covariances(self._ticks[row])[:, :size, :size][:, seen][:, :, seen])
-            )
+            covariances = self._covariances(self._ticks[row])[:, :size, :size][:, seen][:, :, seen]
+            inverse = inverse_of_cholesky(covariances)
             white[:, seen] = np.matmul(inverse, residuals[:, seen][..., None])[..., 0]
             diagonal[:, seen] = np.log(np.diagonal(inverse, axis1=-2, axis2=-1))
         return white, diagonal
