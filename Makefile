@@ -42,9 +42,9 @@ detection: $(VENV)/.demo
 # Peers that the library is compared with live in an environment of their own.
 bench-env: $(BENCH)/.ready
 
-# Failure detectors against one another, on the recordings that PROBDMP_RECORDINGS points at.
+# benchmarks/detection.md: failure detectors against one another, on the recordings that PROBDMP_RECORDINGS points at.
 bench-detection: $(BENCH)/.ready
-	$(BENCH)/bin/python benchmarks/failure_detection.py "$(PROBDMP_RECORDINGS)/uci_letters/letters.npz"
+	$(BENCH)/bin/python benchmarks/detection_tables.py
 
 clean:
 	rm -rf $(VENV) $(BENCH) build src/*.egg-info report.html
