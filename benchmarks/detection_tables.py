@@ -20,9 +20,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from failure_detection import FAULTS, judges, summaries_at
-
 from probdmp import read_demonstrations
-from probdmp.evaluation import Assessment, Evaluation, Experiment, FaultSummary, Rate, Summary, evaluate
+from probdmp.evaluation import Assessment, Evaluation, Experiment, Rate, Summary, evaluate
 
 PAGE = Path(__file__).parent / "detection.md"
 RECORDINGS = Path(os.environ.get("PROBDMP_RECORDINGS", "."))
@@ -33,9 +32,10 @@ OWN = ("calibrated", "paper: predictive, per step")
 PAGE_HEAD = f"""# Failure detectors at equal false alarms
 
 Written by `make bench-detection`, five splits each. [README.md](README.md) says who takes part and how all are kept comparable.
-The threshold of each detector is the lowest at which at most {100 * ALPHA:g} % of the undisturbed executions raise an alarm, whatever its
-calibration; *detected* is a first alarm at or after the onset, in % of the executions, with a 95 % interval by bootstrap over
-classes. The best of each column is bold. Latency: of hold, median / 95th percentile, % of the duration.
+The threshold of each detector is the lowest at which at most {100 * ALPHA:g} % of the undisturbed executions raise an
+alarm, whatever its calibration; *detected* is a first alarm at or after the onset, in % of the executions, with a 95 %
+interval by bootstrap over classes. The best of each column is bold. Latency: of hold, median / 95th percentile, % of the
+duration.
 """
 
 
@@ -81,25 +81,21 @@ def run(job: Job) -> Mapping[str, Assessment]:
 
 
 def table(summaries: Mapping[str, Summary], faults: Sequence[str]) -> Iterator[str]:
-    best = {fault: max(s.faults[fault].detected.rate for s in summaries.values() if s.faults[fault].detected) for fault in faults}
+    rates = {name: [summary.faults[fault].detected for fault in faults] for name, summary in summaries.items()}
+    best = [max(rate.rate for rate in column if rate is not None) for column in zip(*rates.values(), strict=True)]
     yield f"| detector | false alarms | {' | '.join(faults)} | latency of hold |"
     yield "|" + "---|" * (len(faults) + 3)
     for name, summary in summaries.items():
-        cells = [rate_text(summary.faults[fault].detected, best[fault]) for fault in faults]
-        yield f"| {name} | {rate_text(summary.false_alarms)} | {' | '.join(cells)} | {latency_text(summary.faults['hold'])} |"
+        detected = [rate_text(*pair) for pair in zip(rates[name], best, strict=True)]
+        cells = [name, summary.false_alarms.in_percent, *detected, summary.faults["hold"].latency_in_percent]
+        yield f"| {' | '.join(cells)} |"
 
 
-def rate_text(rate: Rate | None, best: float | None = None) -> str:
+def rate_text(rate: Rate | None, best: float) -> str:
     if rate is None:
         return "–"
-    point = f"{100 * rate.rate:.1f}"
-    return f"{f'**{point}**' if rate.rate == best else point} ({100 * rate.low:.1f}–{100 * rate.high:.1f})"
-
-
-def latency_text(figures: FaultSummary) -> str:
-    if figures.latency_median is None or figures.latency_p95 is None:
-        return "–"
-    return f"{100 * figures.latency_median:.1f} / {100 * figures.latency_p95:.1f}"
+    point, rest = rate.in_percent.split(maxsplit=1)
+    return f"**{point}** {rest}" if rate.rate == best else rate.in_percent
 
 
 def main() -> None:

@@ -183,14 +183,8 @@ def pooled(found: Mapping[Job, Assessment], data: str, task: str, without: str =
 # --- tables -----------------------------------------------------------------------------------------------------------
 
 
-def rate_text(rate: Rate | None) -> str:
-    return "–" if rate is None else f"{100 * rate.rate:.1f} ({100 * rate.low:.1f}–{100 * rate.high:.1f})"
-
-
-def latency_text(figures: FaultSummary | None) -> str:
-    if figures is None or figures.latency_median is None or figures.latency_p95 is None:
-        return "–"
-    return f"{100 * figures.latency_median:.1f} / {100 * figures.latency_p95:.1f}"
+def in_percent(rate: Rate | None) -> str:
+    return "–" if rate is None else rate.in_percent
 
 
 def rows(table: Sequence[Sequence[str]]) -> Iterator[str]:
@@ -201,22 +195,24 @@ def rows(table: Sequence[Sequence[str]]) -> Iterator[str]:
 
 
 def figures_table(results: Mapping[tuple[str, str], Result]) -> Iterator[str]:
+    def cells(name: str, text: Callable[[FaultSummary], str]) -> list[str]:
+        figures = [r.summary.faults.get(name) for r in results.values()]
+        return ["–" if f is None else text(f) for f in figures]
+
     heads = [f"{data}, {task}" for data, task in results]
     sizes = [f"{r.summary.false_alarms.n}" for r in results.values()]
     table = [["%, of n executions", *heads], ["n", *sizes]]
-    table.append(["false alarms", *(rate_text(r.summary.false_alarms) for r in results.values())])
+    table.append(["false alarms", *(r.summary.false_alarms.in_percent for r in results.values())])
     for fault in BENIGN:
-        benign = [r.summary.faults.get(fault) for r in results.values()]
-        table.append([f"{fault}: false alarms", *(rate_text(f.false_alarms) if f else "–" for f in benign)])
+        table.append([f"{fault}: false alarms", *cells(fault, lambda f: in_percent(f.false_alarms))])
     for fault in MOVEMENTS:
-        figures = [r.summary.faults.get(fault) for r in results.values()]
-        table.append([f"{fault}: detected", *(rate_text(f.detected) if f else "–" for f in figures)])
+        table.append([f"{fault}: detected", *cells(fault, lambda f: in_percent(f.detected))])
         if fault == "hold":
-            table.append(["hold: ever", *(rate_text(f.ever) if f else "–" for f in figures)])
+            table.append(["hold: ever", *cells(fault, lambda f: f.ever.in_percent)])
         if fault in ("hold", "slow"):
             told = "called held" if fault == "hold" else "not called held"
-            table.append([f"{fault}: {told}, of those", *(rate_text(f.told_apart) if f else "–" for f in figures)])
-        table.append([f"{fault}: latency, median / p95", *(latency_text(f) for f in figures)])
+            table.append([f"{fault}: {told}, of those", *cells(fault, lambda f: in_percent(f.told_apart))])
+        table.append([f"{fault}: latency, median / p95", *cells(fault, lambda f: f.latency_in_percent)])
     return rows(table)
 
 
@@ -254,7 +250,7 @@ def ablation_table(found: Mapping[Job, Assessment]) -> Iterator[str]:
         for data in ABLATED:
             summary = pooled(found, data, "known", name or "nothing").summary
             faults = summary.faults
-            cells += [f"{100 * summary.false_alarms.rate:.1f}", f"{ever(faults['hold'])}, {latency_text(faults['hold'])}"]
+            cells += [f"{100 * summary.false_alarms.rate:.1f}", f"{ever(faults['hold'])}, {faults['hold'].latency_in_percent}"]
             cells += [ever(faults["push:0.25"]), ever(faults["wrong_goal"])]
         table.append([name or "– (all of it)", *cells])
     return rows(table)

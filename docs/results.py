@@ -83,7 +83,7 @@ def full(results: dict[tuple[str, str, str], dict[str, Summary]]) -> Iterator[st
                 for reading, summary in results[name, configuration, task].items():
                     hold = summary.faults["hold"]
                     cells = [
-                        f"{rate.count}, {100 * rate.rate:.1f} ({100 * rate.low:.1f}–{100 * rate.high:.1f})"
+                        f"{rate.count}, {rate.in_percent}"
                         for rate in (summary.false_alarms, hold.detected, hold.ever)
                         if rate is not None
                     ]

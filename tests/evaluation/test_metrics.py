@@ -50,6 +50,7 @@ def test_the_other_outcome_has_the_mirrored_interval(n, data):
 def test_in_words():
     assert str(rate_of(2, 220)) == "2/220 (0.9 %, 0.1–3.2 %)"
     assert str(rate_of(220, 220)) == "220/220 (100.0 %, 98.3–100.0 %)"
+    assert rate_of(2, 220).in_percent == "0.9 (0.1–3.2)"
 
 
 def test_the_papers_own_figures():

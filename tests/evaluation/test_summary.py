@@ -33,6 +33,7 @@ def test_latency_is_from_onset_to_alarm_as_a_fraction_of_the_duration():
     ]
     hold = summarize(outcomes).faults["hold"]
     assert hold.latency_median == pytest.approx(0.1)
+    assert hold.latency_in_percent == f"10.0 / {100 * np.quantile([0.1, 0.3, 0.0], 0.95):.1f}"
     assert hold.latency_median_seconds == pytest.approx(0.2)
     assert hold.latency_p95 == pytest.approx(np.quantile([0.1, 0.3, 0.0], 0.95))
 

@@ -26,6 +26,11 @@ class Rate:
     high: float
     """Upper end."""
 
+    @property
+    def in_percent(self) -> str:
+        """The rate and its interval, for a table whose head says that they are percentages."""
+        return f"{100 * self.rate:.1f} ({100 * self.low:.1f}–{100 * self.high:.1f})"
+
     def __str__(self) -> str:
         return f"{self.count}/{self.n} ({100 * self.rate:.1f} %, {100 * self.low:.1f}–{100 * self.high:.1f} %)"
 

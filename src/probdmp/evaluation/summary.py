@@ -76,6 +76,13 @@ class FaultSummary:
     by_onset: tuple[OnsetBin, ...] = ()
     """Detection by when the fault begins; empty for faults that begin with the movement."""
 
+    @property
+    def latency_in_percent(self) -> str:
+        """Median and 95th percentile of the latency, for a table whose head says so; a dash when nothing was detected."""
+        if self.latency_median is None or self.latency_p95 is None:
+            return "–"
+        return f"{100 * self.latency_median:.1f} / {100 * self.latency_p95:.1f}"
+
 
 @dataclass(frozen=True, slots=True)
 class Summary:
