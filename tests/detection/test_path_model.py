@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from probdmp.detection.path_model import NOISE_FLOOR, path_model
+from probdmp.detection.path_model import CLOCK_STD, NOISE_FLOOR, path_model
 from probdmp.detection.phase_clock import TICKS
 from probdmp.detection.profile import ExecutionProfile
 from probdmp.dmp import path_distribution
@@ -27,8 +27,19 @@ def dense(primitive):
     return path.means.ravel() / ranges, path.covariance.reshape(len(ranges), -1) / np.outer(ranges, ranges)
 
 
+@pytest.fixture(scope="module")
+def clock(dense):
+    """(M D, M D) covariance of m'(t) e_t - m'(0) e_0 where the times e of samples are off independently."""
+    slopes = CLOCK_STD * np.gradient(dense[0].reshape(-1, 2), axis=0)
+    errors = np.zeros((TICKS + 1, 2, TICKS + 1))
+    for t in range(1, TICKS + 1):
+        errors[t, :, t], errors[t, :, 0] = slopes[t], -slopes[0]
+    errors = errors.reshape(-1, TICKS + 1)
+    return errors @ errors.T
+
+
 @pytest.mark.parametrize("told", [[0.3, -0.8], [1.1, 0.2]])
-def test_a_told_goal_is_conditioned_on(primitive, profile, dense, told):
+def test_a_told_goal_is_conditioned_on(primitive, profile, dense, clock, told):
     mean, covariance = dense
     noise = np.diag((profile.noise_stds / primitive.ranges) ** 2 + NOISE_FLOOR**2)
     end = slice(TICKS * 2, None)
@@ -37,7 +48,7 @@ def test_a_told_goal_is_conditioned_on(primitive, profile, dense, told):
     np.testing.assert_allclose(model.noise_variances, np.diag(noise), rtol=1e-12)
     np.testing.assert_allclose(model.means_for(np.array([told]))[0].ravel(), mean + gain @ (told - mean[end]), atol=1e-9)
     found = model.covariance.reshape(covariance.shape)
-    np.testing.assert_allclose(found, covariance - gain @ covariance[end], atol=1e-9)
+    np.testing.assert_allclose(found, covariance - gain @ covariance[end] + clock, atol=1e-9)
 
 
 def test_a_goal_that_is_not_told_moves_nothing(primitive, profile, dense):
@@ -49,7 +60,7 @@ def test_a_goal_that_is_not_told_moves_nothing(primitive, profile, dense):
     np.testing.assert_allclose(untold, mean, atol=1e-12)
 
 
-def test_without_a_goal_executions_may_be_slower_or_faster(primitive, profile, dense):
+def test_without_a_goal_executions_may_be_slower_or_faster(primitive, profile, dense, clock):
     mean, covariance = dense
     model = path_model(primitive, profile, knows_goal=False)
     for goals in ([[0.4, -3.0]], [[np.nan, np.nan]]):
@@ -57,7 +68,8 @@ def test_without_a_goal_executions_may_be_slower_or_faster(primitive, profile, d
     phases = np.linspace(0, 1, TICKS + 1)
     velocities = np.gradient(mean.reshape(-1, 2), phases, axis=0)
     stretch = (float(profile.tempo_std) * phases[:, None] * velocities).ravel()
-    np.testing.assert_allclose(model.covariance.reshape(covariance.shape), covariance + np.outer(stretch, stretch), atol=1e-12)
+    found = model.covariance.reshape(covariance.shape)
+    np.testing.assert_allclose(found, covariance + np.outer(stretch, stretch) + clock, atol=1e-12)
 
 
 @pytest.mark.parametrize("knows_goal", [True, False])

@@ -4,7 +4,8 @@
 
 Where the goal is told, the Gaussian is conditioned on ending there: the shape changes as the demonstrations say it does.
 Where it is not, neither is the duration: that executions are slower or faster adds d^2 (s m'(s)) (s m'(s))^T, d the standard
-deviation of log durations. Positions are in units of each degree of freedom's range, so nothing here has a unit.
+deviation of log durations. Each sample, the first one included, may be off its time by c ticks, which moves it by c m'.
+Positions are in units of each degree of freedom's range, so nothing here has a unit.
 """
 
 from dataclasses import dataclass
@@ -20,6 +21,8 @@ __all__ = ["PathModel", "path_model"]
 
 NOISE_FLOOR = 0.01
 """Standard deviation of what a path is measured with at the least, as a fraction of the range."""
+CLOCK_STD = 0.3
+"""c, ticks: standard deviation of the time at which a sample was really taken."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,4 +66,14 @@ def path_model(primitive: Primitive, profile: ExecutionProfile, knows_goal: bool
         phases = np.linspace(0.0, 1.0, TICKS + 1)
         stretch = profile.tempo_std * phases[:, None] * np.gradient(means, phases, axis=0)
         covariance = covariance + np.multiply.outer(stretch, stretch)
-    return PathModel(means, covariance, gains, noise)
+    return PathModel(means, covariance + _clock_covariance(means), gains, noise)
+
+
+def _clock_covariance(means: FloatArray) -> FloatArray:
+    """What uncertain times of samples add, (M, D, M, D); displacements count from the first, so its error is in all others."""
+    moved = CLOCK_STD * np.gradient(means, axis=0)
+    covariance = np.zeros((*means.shape, *means.shape))
+    covariance[1:, :, 1:, :] = np.multiply.outer(moved[0], moved[0])[None, :, None, :]
+    ticks = np.arange(1, len(means))
+    covariance[ticks, :, ticks, :] += moved[1:, :, None] * moved[1:, None, :]
+    return covariance
