@@ -31,7 +31,7 @@ OWN = ("calibrated", "paper: predictive, per step")
 """This library's detectors that take part; docs/paper.md has the others."""
 PAGE_HEAD = f"""# Failure detectors at equal false alarms
 
-Written by `make bench-detection`, five splits each. [README.md](README.md) says who takes part and how all are kept comparable.
+Written by `make bench-detection`, two splits each. [README.md](README.md) says who takes part and how all are kept comparable.
 The threshold of each detector is the lowest at which at most {100 * ALPHA:g} % of the undisturbed executions raise an
 alarm, whatever its calibration; *detected* is a first alarm at or after the onset, in % of the executions, with a 95 %
 interval by bootstrap over classes. The best of each column is bold. Latency: of hold, median / 95th percentile, % of the
@@ -100,7 +100,7 @@ def rate_text(rate: Rate | None, best: float) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description="Compare failure detectors.")
-    parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--seeds", type=int, default=2)
     parser.add_argument("--classes", type=int, default=None, help="only the first few of each file")
     parser.add_argument("--dry", action="store_true", help="print the tables and leave the page as it is")
     given = parser.parse_args()
