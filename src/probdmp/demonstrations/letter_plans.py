@@ -32,9 +32,9 @@ PLANS = {
     "y": "0,102   2,32,0  76,34,+170  82,100,0 / 80,-55,0  -10,-80,-150",
     "z": "0,97    80,99,-8 / 0,0,0 / 84,0,+8",
 }
-"""By letter: where the pen is set down, x,y, then stroke by stroke x,y,bend: the virtual target, hundredths of the x-height, y = 0
-the baseline, and by how many degrees the stroke turns on its way, counterclockwise. A stroke begins while the one before is
-under way, and the pen rounds the target between them; after a slash it waits, and the pen turns at the target nearly at rest."""
+"""By letter: x,y where the pen is set down, then x,y,bend stroke by stroke: the virtual target, hundredths of the x-height with
+the baseline at y = 0, and by how many degrees the stroke turns on its way there, counterclockwise. A stroke begins while the
+one before is under way, and the pen rounds the target between them. After a slash it waits, and the pen all but stops there."""
 
 LETTERS = "".join(PLANS)
 """The letters that one stroke of the pen can write."""

@@ -9,14 +9,15 @@ Repetitions differ as `WriterVariation` says, in the plan and in its timing: eac
 recording differs from that by white sensor noise alone.
 """
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from probdmp.checks import MILLISECONDS_HINT, FloatArray, check_array, check_choice, check_count, check_seconds, freeze_arrays
+from probdmp.checks import FloatArray, check_choice, freeze_arrays
 from probdmp.demonstrations.demonstration import Demonstration
 from probdmp.demonstrations.letter_plans import LETTERS, LetterPlan, letter_plan
 from probdmp.demonstrations.sigma_lognormal import Strokes, accelerations, displacements, strokes_between, velocities
+from probdmp.demonstrations.synthesis import check_stds, check_synthesis
 from probdmp.errors import InputError, InputTypeError
 
 __all__ = ["LETTERS", "WriterVariation", "WrittenLetter", "synthetic_letters", "written_letters"]
@@ -38,8 +39,6 @@ CORNER = 0.95
 PEN_DOWN = 3.0
 """Standard deviations of logarithmic time: the recording begins and ends when 0.13 % of the first stroke is written, and when
 as much is left of the last."""
-SAMPLING_INTERVALS = (1e-4, 0.1)
-"""Seconds, shortest and longest dt."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,11 +65,7 @@ class WriterVariation:
     """White noise of each sample, millimetres, per axis."""
 
     def __post_init__(self) -> None:
-        for name in (field.name for field in fields(self)):
-            value = float(check_array(getattr(self, name), name, ()))
-            if value < 0:
-                raise InputError(f"{name} >= 0, a standard deviation", repr(value))
-            object.__setattr__(self, name, value)
+        check_stds(self)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -134,12 +129,7 @@ def written_letters(
     variation: WriterVariation = WriterVariation(),
 ) -> list[WrittenLetter]:
     """The same repetitions as `synthetic_letters`, each with its noise-free movement and the parameters of its strokes."""
-    n_demonstrations = check_count(n_demonstrations, "n_demonstrations")
-    seed = check_count(seed, "seed", least=0)
-    dt = check_seconds(dt, "dt")
-    shortest, longest = SAMPLING_INTERVALS
-    if not shortest <= dt <= longest:
-        raise InputError(f"dt from {shortest:g} to {longest:g} seconds", repr(dt), MILLISECONDS_HINT)
+    n_demonstrations, seed, dt = check_synthesis(n_demonstrations, seed, dt)
     if not isinstance(variation, WriterVariation):
         raise InputTypeError("variation as a WriterVariation", type(variation).__name__)
     return [
@@ -170,9 +160,7 @@ def _write(letter: str, entropy: tuple[int, int, int], dt: float, variation: Wri
     positions = targets[0] + displacements(strokes, times)
     noisy = positions + variation.sensor_noise * rng.standard_normal(positions.shape)
     demonstration = Demonstration(noisy, dt, letter, ("x", "y"), "mm")
-    return WrittenLetter(
-        demonstration, positions, velocities(strokes, times), accelerations(strokes, times), strokes, targets
-    )
+    return WrittenLetter(demonstration, positions, velocities(strokes, times), accelerations(strokes, times), strokes, targets)
 
 
 def _draw_targets(plan: LetterPlan, variation: WriterVariation, rng: np.random.Generator) -> FloatArray:
