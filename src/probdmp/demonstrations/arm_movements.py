@@ -40,7 +40,7 @@ class ArmVariation:
     """White noise of each sample, extents."""
 
     def __post_init__(self) -> None:
-        check_stds(self)
+        check_stds(self, tempo=0.5, timing=0.5)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -65,7 +65,7 @@ class WriterVariation:
     """White noise of each sample, millimetres, per axis."""
 
     def __post_init__(self) -> None:
-        check_stds(self)
+        check_stds(self, shape=0.5, bend=15.0, size=0.5, aspect=0.5, slant=15.0, tempo=0.5, timing=0.5)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -3,7 +3,7 @@
 from dataclasses import fields
 from typing import Any
 
-from probdmp.checks import MILLISECONDS_HINT, check_array, check_count, check_seconds
+from probdmp.checks import LARGEST_MAGNITUDE, MILLISECONDS_HINT, check_array, check_count, check_seconds
 from probdmp.errors import InputError
 
 __all__ = ["check_stds", "check_synthesis"]
@@ -23,10 +23,16 @@ def check_synthesis(n_demonstrations: int, seed: int, dt: float) -> tuple[int, i
     return n_demonstrations, seed, dt
 
 
-def check_stds(variation: Any) -> None:
-    """Check the fields of a frozen dataclass of standard deviations, and make them floats, in place."""
+def check_stds(variation: Any, **most: float) -> None:
+    """Check the fields of a frozen dataclass of standard deviations, and make them floats, in place.
+
+    Parameters
+    ----------
+    most : the largest allowed, by name, of those that have one: beyond it is no variation of the same movement any more.
+    """
     for name in (field.name for field in fields(variation)):
         value = float(check_array(getattr(variation, name), name, ()))
-        if value < 0:
-            raise InputError(f"{name} >= 0, a standard deviation", repr(value))
+        if not 0 <= value <= most.get(name, LARGEST_MAGNITUDE):
+            bound = f", at most {most[name]:g}" if name in most else ""
+            raise InputError(f"{name} >= 0, a standard deviation{bound}", repr(value))
         object.__setattr__(variation, name, value)
