@@ -112,10 +112,11 @@ def _response(strokes: Strokes, times: FloatArray) -> tuple[FloatArray, FloatArr
 
     mu, sigma = strokes.log_time_delays, strokes.log_response_times
     since = times[:, None] - strokes.onsets
-    elapsed = np.where(since > 0, since, np.exp(mu))  # any positive number: the result is 0 there
-    z = (np.log(elapsed) - mu) / sigma
-    density = np.exp(-(z**2) / 2) / (np.sqrt(2 * np.pi) * sigma * elapsed)
-    slope = -density * (1 + z / sigma) / elapsed
+    log_time = np.log(np.where(since > 0, since, 1.0))  # 1: anything, the result is 0 there
+    z = (log_time - mu) / sigma
+    # Divided by the time in the exponent: of a time next to nothing the reciprocal alone would overflow.
+    density = np.exp(-(z**2) / 2 - log_time) / (np.sqrt(2 * np.pi) * sigma)
+    slope = -np.exp(-(z**2) / 2 - 2 * log_time) * (1 + z / sigma) / (np.sqrt(2 * np.pi) * sigma)
     return np.where(since > 0, ndtr(z), 0.0), np.where(since > 0, density, 0.0), np.where(since > 0, slope, 0.0)
 
 
