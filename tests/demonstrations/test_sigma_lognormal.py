@@ -171,10 +171,10 @@ def test_the_bell_is_skewed_to_the_right(strokes):
     assert above[-1] - peak > peak - above[0] - 2 * (grid[1] - grid[0])
 
 
-def test_instants_are_quantiles_of_the_distance():
+def test_instants_are_those_of_a_share_of_the_distance():
     strokes = Strokes(*(np.array([value]) for value in (0.3, -1.5, 0.25, 7.0, 0.0, 0.0)))
-    for quantile, share in ((0.0, 0.5), (1.0, 0.841345), (-3.0, 0.00135)):
-        assert displacements(strokes, strokes.instants(quantile))[0, 0] == pytest.approx(7 * share, rel=1e-3)
+    for z, share in ((0.0, 0.5), (1.0, 0.841345), (-3.0, 0.00135)):
+        assert displacements(strokes, strokes.instants(z))[0, 0] == pytest.approx(7 * share, rel=1e-3)
 
 
 def test_strokes_are_a_frozen_copy():

@@ -47,9 +47,9 @@ class Strokes:
         for name in (field.name for field in fields(self)):
             object.__setattr__(self, name, frozen(getattr(self, name)))
 
-    def instants(self, quantile: float) -> FloatArray:
-        """(N,) array, seconds: when each stroke is `quantile` standard deviations of its logarithmic time past its median."""
-        return self.onsets + np.exp(self.log_time_delays + quantile * self.log_response_times)
+    def instants(self, z: float) -> FloatArray:
+        """(N,) array, seconds: when each stroke has Phi(z) of its distance behind it."""
+        return self.onsets + np.exp(self.log_time_delays + z * self.log_response_times)
 
 
 def strokes_between(
