@@ -23,6 +23,7 @@ PUBLIC = [
     "load",
     "load_detector",
     "read_demonstrations",
+    "synthetic_arm_movements",
     "synthetic_letters",
     "write_demonstrations",
 ]

@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from probdmp.demonstrations import Demonstration, demonstration_from_times, synthetic_letters
+    from probdmp.demonstrations import Demonstration, demonstration_from_times, synthetic_arm_movements, synthetic_letters
     from probdmp.detection import FailureDetector, Verdict
     from probdmp.dmp import Primitive, Task
     from probdmp.errors import InputError, ModelFileError, ProbDMPError
@@ -35,6 +35,7 @@ __all__ = [
     "load",
     "load_detector",
     "read_demonstrations",
+    "synthetic_arm_movements",
     "synthetic_letters",
     "write_demonstrations",
 ]
@@ -42,7 +43,7 @@ __all__ = [
 __version__ = "0.1.0"
 
 _HOMES = {
-    "demonstrations": ("Demonstration", "demonstration_from_times", "synthetic_letters"),
+    "demonstrations": ("Demonstration", "demonstration_from_times", "synthetic_arm_movements", "synthetic_letters"),
     "detection": ("FailureDetector", "Verdict"),
     "dmp": ("Primitive", "Task"),
     "errors": ("InputError", "ModelFileError", "ProbDMPError"),

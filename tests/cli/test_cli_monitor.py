@@ -112,9 +112,12 @@ def test_json_lines_without_a_task_give_the_verdict_of_the_file(folder, run, run
         steps = answers(run("monitor", folder / "c.probdmp", "-", text=text))
         (file,) = json.loads(run("monitor", folder / "c.probdmp", tmp_path / "one.npz", "--json").stdout)["executions"]
         assert steps[-1]["failed"] is file["failed"]
-        assert steps[file["step"]]["test_ratio"] == pytest.approx(file["test_ratio"], rel=1e-9, abs=1e-9)
         ratios = [step["test_ratio"] for step in steps]
-        assert file["test_ratio"] == pytest.approx(ratios[file["step"]] if file["failed"] else max(ratios), rel=1e-9, abs=1e-9)
+        if file["failed"]:  # of the first of several moments that one sample completes, of which a step tells the largest
+            assert max(ratios[: file["step"]], default=0) <= 1 < file["test_ratio"] <= ratios[file["step"]] * (1 + 1e-9)
+        else:
+            assert file["test_ratio"] == pytest.approx(max(ratios), rel=1e-9, abs=1e-9)
+            assert ratios[file["step"]] == pytest.approx(max(ratios), rel=1e-9, abs=1e-9)
 
 
 def test_an_answer_per_tick_is_that_of_the_execution(folder, run, blocked):

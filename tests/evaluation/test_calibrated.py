@@ -82,8 +82,10 @@ def test_a_higher_rate_is_the_lower_threshold_of_the_calibration(demos, experime
     (facts,) = evaluation.by_seed[0]["calibrated"].calibrations
     moved = at_level(outcomes, facts.thresholds[0.01] / facts.threshold)
     asked = evaluate(demos, replace(experiment, false_alarm_rate=0.01, traces=False)).outcomes["calibrated"]
-    same = [a.alarms[f] == b.alarms[f] for a, b in zip(moved, asked, strict=True) for f in ("hold", "slow", "wrong_class")]
-    assert np.mean(same) > 0.85
+    pairs = [(a.alarms[f], b.alarms[f]) for a, b in zip(moved, asked, strict=True) for f in ("hold", "slow", "wrong_class")]
+    assert all((a is None) == (b is None) for a, b in pairs)
+    apart = np.array([abs(a - b) for a, b in pairs if a is not None]) / demos[0].dt
+    assert np.mean(apart < 1 + 1e-9) > 0.9
     assert [one.nominal for one in realized_rates([evaluation.by_seed[0]["calibrated"]])] == [0.01, 0.02, 0.05, 0.1]
 
 

@@ -99,7 +99,7 @@ def test_training_and_test_demonstrations_are_different_ones():
 
 def test_each_test_case_is_perturbed_by_blocking_it():
     """We perturb the simulated execution of each test case by artificially blocking it: at a random onset in 30 to 70 %."""
-    (trial,) = draw_trials(synthetic_letters(20, letters="l"), Experiment())
+    (trial,) = draw_trials(synthetic_letters(20, letters="s"), Experiment())
     phases = []
     for test, faulty, onset in zip(trial.tests, trial.faulty["hold"], trial.onsets["hold"], strict=True):
         np.testing.assert_array_equal(faulty.positions[:onset], test.positions[:onset])
