@@ -4,8 +4,8 @@ from pathlib import Path
 
 from probdmp import synthetic_letters
 from probdmp.evaluation import Experiment, illustrate
-from probdmp.plotting.failure_detection import draw_failure_detection
-from probdmp.plotting.style import figure_style
+from probdmp.plotting.failure_detection import failure_detection_panels
+from probdmp.plotting.panels import save_panels
 
 IMAGES = Path(__file__).parent / "images"
 
@@ -13,9 +13,7 @@ IMAGES = Path(__file__).parent / "images"
 def main() -> None:
     experiment = Experiment()
     letters = synthetic_letters(experiment.train + experiment.test, letters="a")
-    with figure_style():
-        figure = draw_failure_detection(illustrate(letters, experiment))
-        figure.savefig(IMAGES / "failure_detection.png", dpi=150)
+    save_panels(IMAGES / "failure_detection.png", failure_detection_panels(illustrate(letters, experiment)), 3)
 
 
 if __name__ == "__main__":
