@@ -24,11 +24,17 @@ def test_the_page_of_an_evaluation(evaluation):
     record = evaluation.record("probdmp evaluate 'a b.npz'")
     text = evaluation_page(record)
     check_page(text)
-    for words in ("3/3", "Operating curves", "How each number was made", "Clopper", "probdmp evaluate &#x27;a b.npz&#x27;"):
+    hold = record.judges[0].summary.faults["hold"].detected
+    for words in (
+        f"{hold.count}/{hold.n}",
+        "Operating curves",
+        "How each number was made",
+        "Clopper",
+        "probdmp evaluate &#x27;a b.npz&#x27;",
+    ):
         assert words in text
     assert "One execution" not in text
     assert "holds figures, no recordings" in text
-    assert record.judges[0].summary.faults["hold"].detected.count == 6 or "61" in text
 
 
 def test_with_an_example_it_shows_an_execution(evaluation):

@@ -32,9 +32,8 @@ def every_panel(primitive, letters, blocked, judged, evaluation):
     its_own = task_of_recording(primitive, blocked)
     tracked, smoothed = track_recording(primitive, its_own, blocked), smooth_recording(primitive, its_own, blocked)
     judge = evaluation.record().judges[0]
-    demonstrations = [d for trial in (letters,) for d in trial]
     return [
-        *demonstration_panels(demonstrations),
+        *demonstration_panels(letters),
         *class_panels({"a": letters[:3], "": letters[3:]}),
         *basis_panels(primitive),
         *forcing_panels(primitive),

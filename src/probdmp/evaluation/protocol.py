@@ -54,7 +54,7 @@ class Evaluation:
             seeds=experiment.seeds,
             detector=experiment.detector,
             task=experiment.task,
-            false_alarm_rate=experiment.false_alarm_rate if any(any(j.calibrations.values()) for j in judges) else None,
+            false_alarm_rate=experiment.false_alarm_rate if any(j.calibrations for j in judges) else None,
             interval=CLOPPER_PEARSON if len(self.by_seed) == 1 else BOOTSTRAP,
             judges=judges,
             command=command,
@@ -78,7 +78,7 @@ class Evaluation:
 
     def _judge_record(self, name: str, summary: Summary) -> JudgeRecord:
         assessments, outcomes = [split[name] for split in self.by_seed.values()], self.outcomes[name]
-        calibrations = {seed: split[name].calibrations for seed, split in self.by_seed.items()}
+        calibrations = {seed: facts for seed, split in self.by_seed.items() if (facts := split[name].calibrations)}
         if not has_traces(outcomes):
             return JudgeRecord(name, summary, calibrations)
         realized = tuple(realized_rates(assessments))

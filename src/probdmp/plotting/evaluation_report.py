@@ -126,7 +126,7 @@ def _rates(record: EvaluationRecord) -> list[str]:
 
 
 def _calibration(judge: JudgeRecord) -> list[str]:
-    if not any(judge.calibrations.values()):
+    if not judge.calibrations:
         return []
     parts = [heading("Is the rate of false alarms kept?"), calibration_table(judge.calibrations)]
     if not judge.realized:

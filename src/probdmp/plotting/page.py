@@ -28,7 +28,7 @@ PAGE = """<!doctype html>
   .wide {{ overflow-x: auto; margin: .6rem 0 1.2rem; }}
   table {{ border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .9rem; }}
   th, td {{ text-align: left; padding: .35rem 1rem .35rem 0; border-bottom: 1px solid var(--line); vertical-align: top; }}
-  td {{ overflow-wrap: normal; min-width: 3rem; }} td:first-child {{ min-width: 6rem; }} .many {{ min-width: 46rem; }}
+  td {{ overflow-wrap: normal; min-width: 3rem; }} td:first-child {{ min-width: 6rem; }} .many {{ min-width: 42rem; }}
   td small {{ display: block; color: var(--soft); white-space: nowrap; }}
   figure {{ margin: .8rem 0 1.2rem; }}
   .panels {{ display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 24rem), 1fr)); gap: .6rem; }}
@@ -57,7 +57,7 @@ PAGE = """<!doctype html>
 """
 
 
-MANY_COLUMNS = 6
+MANY_COLUMNS = 5
 """So many are not squeezed on a phone, but scroll."""
 
 
