@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 from probdmp.evaluation import Illustration, JudgedExecution
 from probdmp.plotting.monitoring import Curve, mark_alarm, plot_log_likelihoods
 from probdmp.plotting.panels import Panel
+from probdmp.plotting.style import legend_beside
 from probdmp.plotting.trajectories import plot_rollout
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ def plot_illustrated_likelihoods(ax: "Axes", illustration: Illustration) -> "Axe
     verdict = illustration.disturbed.verdict
     if verdict.failed:
         mark_alarm(ax, verdict.time, float(illustration.disturbed.statistic[verdict.step]))
-    ax.legend(loc="best")
+    legend_beside(ax)
     return ax
 
 
@@ -48,5 +49,5 @@ def failure_detection_panels(illustration: Illustration) -> list[Panel]:
     return [
         *(Panel(title, partial(plot_judged_execution, illustration=illustration, judged=judged, dof=dof), 3.7, 3.2)
           for title, judged in both.items()),
-        Panel("Log-likelihood", partial(plot_illustrated_likelihoods, illustration=illustration), 3.7, 3.2),
+        Panel("Log-likelihood", partial(plot_illustrated_likelihoods, illustration=illustration), 4.8, 3.2),
     ]  # fmt: skip

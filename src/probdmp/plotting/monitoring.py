@@ -11,7 +11,7 @@ from probdmp.checks import FloatArray
 from probdmp.evaluation import JudgedExecution
 from probdmp.execution import GaussianTrajectory
 from probdmp.plotting.panels import Panel
-from probdmp.plotting.style import ALARM, FAULTY, RECORDED, mark_onset
+from probdmp.plotting.style import ALARM, FAULTY, RECORDED, legend_beside, mark_onset
 from probdmp.plotting.trajectories import plot_rollout
 
 if TYPE_CHECKING:
@@ -127,7 +127,7 @@ def monitoring_panels(rollout: GaussianTrajectory, judged: JudgedExecution, onse
     def draw_likelihoods(ax: "Axes") -> None:
         plot_log_likelihoods(ax, [Curve("execution", times, judged.statistic)], judged.level, onset)
         if judged.level is not None:
-            ax.legend(loc="best")
+            legend_beside(ax)
 
     return [
         *(Panel(name, partial(draw_position, dof=dof)) for dof, name in enumerate(rollout.names)),
