@@ -10,7 +10,8 @@ from probdmp import synthetic_arm_movements, synthetic_letters
 from probdmp.demonstrations import ARM_MOVEMENTS, LETTERS, written_letters
 from probdmp.demonstrations.sigma_lognormal import speeds
 from probdmp.evaluation import Experiment, illustrate
-from probdmp.plotting.failure_detection import draw_failure_detection
+from probdmp.plotting.failure_detection import failure_detection_panels
+from probdmp.plotting.panels import tiled
 from probdmp.plotting.style import MEAN, figure_style, series
 
 if TYPE_CHECKING:
@@ -22,7 +23,8 @@ IMAGES = Path(__file__).parent / "images"
 def failure_detection() -> "Figure":
     """The paper's figure."""
     experiment = Experiment()
-    return draw_failure_detection(illustrate(synthetic_letters(experiment.train + experiment.test, letters="a"), experiment))
+    shown = illustrate(synthetic_letters(experiment.train + experiment.test, letters="a"), experiment)
+    return tiled(failure_detection_panels(shown), 3)
 
 
 def letters(repetitions: int = 6, per_row: int = 3, pitch: float = 22.0) -> "Figure":

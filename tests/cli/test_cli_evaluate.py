@@ -9,6 +9,7 @@ import pytest
 
 from probdmp import write_demonstrations
 from probdmp.cli.evaluation_table import print_evaluation
+from probdmp.cli.output import json_line
 from probdmp.demonstrations import FAULTS, synthetic_letters
 from probdmp.dmp import Configuration
 from probdmp.evaluation import DETECTORS, READINGS, TASKS, Assessment, Evaluation, Experiment, Finding, Outcome
@@ -18,13 +19,17 @@ SMALL = ("--train", 3, "--test", 3)
 PAPER = ("--detector", "paper")
 
 
-def as_json(evaluation):
-    return json.loads(json.dumps(evaluation.as_dict()))
+def as_json(evaluation, command):
+    return json.loads(json_line(evaluation.as_dict(command)))
 
 
 def test_the_document_is_that_of_the_evaluation(folder, run_json, letters):
     document = run_json("evaluate", folder / "letters.npz", *SMALL, "--seed", 5, "--task", "nominal")
-    assert document == as_json(evaluate_directly(letters, Experiment(3, 3, 5, "calibrated", "nominal")))
+    expected = evaluate_directly(letters, Experiment(3, 3, 5, "calibrated", "nominal", traces=True))
+    assert document == as_json(expected, document["command"])
+    assert document["command"].endswith(
+        "--seed 5 --seeds 1 --detector calibrated --task nominal --fault hold --false-alarm-rate 0.01"
+    )
     assert (document["classes"], document["seed"], document["task"]) == (2, 5, "nominal")
 
 
@@ -53,7 +58,8 @@ def test_the_calibration_is_told(folder, run_json, run):
 
 def test_the_librarys_own_configuration(folder, run_json, letters):
     document = run_json("evaluate", folder / "letters.npz", *SMALL, *PAPER, "--configuration", "default")
-    assert document == as_json(evaluate_directly(letters, Experiment(3, 3, configuration=Configuration())))
+    expected = evaluate_directly(letters, Experiment(3, 3, configuration=Configuration(), traces=True))
+    assert document == as_json(expected, document["command"])
 
 
 def test_the_table_has_the_papers_figures_and_every_reading(folder, run):
@@ -117,7 +123,8 @@ def test_another_movement_needs_another_class(folder, run, tmp_path, letters):
 
 def test_several_seeds(folder, run_json, letters):
     document = run_json("evaluate", folder / "letters.npz", *SMALL, "--seed", 5, "--seeds", 2)
-    assert document == as_json(evaluate_directly(letters, Experiment(3, 3, 5, "calibrated", seeds=2)))
+    expected = evaluate_directly(letters, Experiment(3, 3, 5, "calibrated", seeds=2, traces=True))
+    assert document == as_json(expected, document["command"])
     assert [one["seed"] for one in document["per_seed"]] == [5, 6]
     assert [facts["seed"] for facts in document["calibrations"]] == [5, 6]
 
@@ -131,7 +138,7 @@ def test_a_report_of_an_evaluation(folder, run, tmp_path):
     text = page.read_text()
     for words in ("push", "dropout", "Called a sensor fault", "Is the rate of false alarms kept?", "Operating curves"):
         assert words in text
-    assert text.count("<svg") == 5
+    assert text.count("<svg") == 1 + 3 + 2 + 3 + 7  # realised; operating; when; one execution; what was learned
     assert "model-based, not guaranteed" in text
     command = re.search(r"<code>probdmp (evaluate .*?)</code>", text)[1]
     again = run(*unescape(command).split(), "--report", tmp_path / "again.html")
@@ -223,10 +230,10 @@ def test_demo_without_matplotlib_says_what_to_install(run, monkeypatch, tmp_path
 def test_demo_prints_the_document_of_the_evaluation(run, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     result = run(*DEMO, "--seed", 3, "-o", tmp_path / "r.html", "--json")
-    experiment, paper = Experiment(2, 2, 3, "calibrated"), READINGS[0].name
+    experiment, paper = Experiment(2, 2, 3, "calibrated", traces=True), READINGS[0].name
     judges = {**DETECTORS["calibrated"], paper: DETECTORS["paper"][paper]}
     expected = evaluate_directly(synthetic_letters(4, 3, "l"), experiment, judges)
-    assert json.loads(result.stdout) == as_json(expected)
+    assert json.loads(result.stdout) == as_json(expected, "probdmp demo --letters l --train 2 --test 2 --seed 3")
 
 
 def test_demo_refuses_before_it_works(run, tmp_path):

@@ -6,9 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from strategies import make_primitive, primitives, seeds
 
-from probdmp.dmp import linear_gaussian_model, step_count, task_for
-from probdmp.execution import roll_out, sample_trajectories
+from probdmp.demonstrations import synthetic_letters
+from probdmp.dmp import Configuration, linear_gaussian_model, step_count, task_for
+from probdmp.execution import position_covariances, roll_out, sample_trajectories
 from probdmp.gaussian import filter_sequence
+from probdmp.learning import LearningOptions, fit_primitive
 
 N_DRAWS = 4000
 
@@ -100,3 +102,30 @@ def test_draws_are_as_long_as_the_rollout():
         task = task_for(primitive, duration=duration)
         (draw,) = sample_trajectories(primitive, task, dt, 1, np.random.default_rng(0), True)
         assert draw.shape == roll_out(primitive, task, dt).positions.shape == (step_count(duration, dt), 2)
+
+
+@pytest.mark.parametrize("uncertainty", ["joint", "independent"])
+def test_covariances_of_positions_have_the_variances_of_the_rollout(uncertainty):
+    primitive = learned(uncertainty)
+    task = task_for(primitive, duration=1.5)
+    covariances = position_covariances(primitive, task, 0.02)
+    planned = roll_out(primitive, task, 0.02)
+    variances = np.diagonal(covariances, axis1=1, axis2=2)
+    np.testing.assert_allclose(variances, planned.position_stds**2, atol=1e-9 * primitive.ranges.max() ** 2)
+    assert np.all(np.linalg.eigvalsh(covariances) >= -1e-9)
+    assert np.any(np.abs(covariances[:, 0, 1]) > 1e-3) == (uncertainty == "joint")
+
+
+def test_covariances_of_positions_are_those_of_samples():
+    primitive = learned("joint")
+    task = task_for(primitive)
+    paths = np.array(sample_trajectories(primitive, task, 0.05, 4000, np.random.default_rng(0), sensor_noise=False))
+    expected = position_covariances(primitive, task, 0.05)
+    for t in (5, 15, paths.shape[1] - 1):
+        scale = np.sqrt(np.outer(*[np.diag(expected[t])] * 2))
+        np.testing.assert_allclose(np.cov(paths[:, t].T) / scale, expected[t] / scale, atol=0.08)
+
+
+def learned(uncertainty):
+    letters = synthetic_letters(6, seed=1, letters="a", dt=0.02)
+    return fit_primitive(letters, Configuration(n_basis=8, weight_uncertainty=uncertainty), LearningOptions("hierarchical"))[0]

@@ -50,11 +50,11 @@ def demo(
         demonstrations = synthetic_letters(train + test, seed, letters)
     paper = READINGS[0].name
     result = evaluation_of(demonstrations, experiment, {**DETECTORS["calibrated"], paper: DETECTORS["paper"][paper]})
+    command = f"probdmp demo --letters {letters} --train {train} --test {test} --seed {seed}"
     if as_json:
-        print_json(result.as_dict())
+        print_json(result.as_dict(command))
     else:
         print_evaluation(result)
-    command = f"probdmp demo --letters {letters} --train {train} --test {test} --seed {seed}"
     if _reported(output, result, demonstrations, command) and not as_json:
         print_line(f"Report: {output}")
 

@@ -1,7 +1,6 @@
 """`probdmp evaluate`: the paper's experiment on any labelled demonstrations."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from shlex import join
 from typing import TYPE_CHECKING, Annotated, Any
@@ -69,6 +68,8 @@ def evaluate(
     For every label: learn from some demonstrations, judge others as recorded and with a fault that begins at a random moment
     in 30 to 70 % of the movement. Rates come with 95 % intervals, exact for one split and by bootstrap over classes for
     several; latencies are fractions of the duration.
+
+    With --json, operating curves too; probdmp plot and probdmp report make pictures and a page of that document.
     """
     check_output(report, ".html")
     with usage():
@@ -82,15 +83,15 @@ def evaluate(
         from probdmp.plotting.style import require_matplotlib
 
         require_matplotlib()
-        experiment = replace(experiment, traces=True)
     demonstrations = read_files([file], names_of(columns))
     result = evaluation_of(demonstrations, experiment)
+    command = _command(file, columns, experiment, configuration)
     if as_json:
-        print_json(result.as_dict())
+        print_json(result.as_dict(command))
     else:
         print_evaluation(result)
     if report is not None:
-        write_evaluation(report, result, demonstrations, _command(file, columns, experiment, configuration))
+        write_evaluation(report, result, demonstrations, command)
         if not as_json:
             print_line(f"Report: {report}")
 
@@ -113,7 +114,7 @@ def _experiment(
         configurations = {"published": PUBLISHED, "default": Configuration()}
         chosen = configurations[check_choice(configuration, "configuration", configurations)]
     rate = DEFAULT_RATE if false_alarm_rate is None else false_alarm_rate
-    return Experiment(**given, detector=detector, configuration=chosen, false_alarm_rate=rate)
+    return Experiment(**given, detector=detector, configuration=chosen, false_alarm_rate=rate, traces=True)
 
 
 def evaluation_of(
@@ -137,9 +138,10 @@ def write_evaluation(path: Path, result: "Evaluation", demonstrations: Sequence[
         If what draws it is not installed.
     """
     from probdmp.evaluation import example_of
-    from probdmp.plotting.report import write_report
+    from probdmp.io import write_atomically
+    from probdmp.plotting.evaluation_report import evaluation_page
 
-    write_report(path, result, example_of(result, demonstrations), command)
+    write_atomically(path, evaluation_page(result.record(command), example_of(result, demonstrations)).encode())
 
 
 def _command(file: Path, columns: str | None, experiment: "Experiment", configuration: str | None) -> str:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from probdmp.cli.command_line import command_line
 from probdmp.cli.detector_choice import FalseAlarmRate, Rule, calibrate, chosen_detector
 from probdmp.cli.detector_summaries import calibration_text, detector_summary
 from probdmp.cli.exit_codes import UsageError, usage
@@ -29,6 +30,7 @@ DECIDED = dict.fromkeys(("discretization", "scaling", "weight_model", "weight_un
 
 
 def fit(
+    context: typer.Context,
     files: Annotated[list[Path], typer.Argument(metavar="FILE…", help="Demonstrations (.npz).", show_default=False)],
     output: Annotated[
         Path,
@@ -108,7 +110,7 @@ def fit(
     library = PrimitiveLibrary(_learn(demonstrations, settings))
     calibrate(detector, library, demonstrations)
     with usage():
-        library.save(output, detector)
+        library.save(output, detector, command_line(context))
     summaries = [_summary(name, learned) for name, learned in library.items()]
     if as_json:
         print_json({"model": str(output), "primitives": summaries, "detector": detector_summary(detector)})

@@ -100,7 +100,7 @@ def names_of(text: str | None) -> Sequence[str] | None:
     return None if text is None else [name.strip() for name in text.split(",")]
 
 
-def check_output(path: Path | None, suffix: str) -> None:
+def check_output(path: Path | None, *suffixes: str) -> None:
     """Refuse a place that cannot be written before the work is done, not after.
 
     Raises
@@ -110,8 +110,8 @@ def check_output(path: Path | None, suffix: str) -> None:
     """
     if path is None:
         return
-    if path.suffix != suffix:
-        raise UsageError(f"an output file that ends in {suffix}", repr(str(path)))
+    if path.suffix not in suffixes:
+        raise UsageError(f"an output file that ends in {' or '.join(suffixes)}", repr(str(path)))
     if not path.parent.is_dir():
         raise UsageError("an output file in a folder that exists", repr(str(path)), f"Make it first: mkdir -p {path.parent}")
 

@@ -19,13 +19,15 @@ from probdmp.cli.exit_codes import exit_code, message, stop_writing
 from probdmp.cli.fit import fit
 from probdmp.cli.inspect import inspect
 from probdmp.cli.monitor import monitor
+from probdmp.cli.plot import plot
+from probdmp.cli.report import report
 from probdmp.cli.rollout import rollout
 from probdmp.cli.smooth import smooth
 from probdmp.cli.track import track
 
 __all__ = ["app", "main"]
 
-VERBS = (demo, fit, inspect, rollout, track, smooth, monitor, evaluate)
+VERBS = (demo, fit, inspect, rollout, track, smooth, monitor, evaluate, plot, report)
 
 EPILOG = (
     "Exit codes: 0 fine, 1 error, 2 usage, 3 bad input data or model file, 4 a failure was detected (monitor), 130 interrupted."

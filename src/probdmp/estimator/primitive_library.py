@@ -52,9 +52,14 @@ class PrimitiveLibrary(Mapping[str, ProbabilisticDMP]):
         contents = read_model(path)
         return cls({label: _restored(contents, label) for label in contents.primitives})
 
-    def save(self, path: str | Path, detector: FailureDetector | None = None) -> None:
-        """Write one model file, atomically, with the detector if given."""
-        write_learned(path, {label: (p.primitive_, p.get_params()) for label, p in self.items()}, detector)
+    def save(self, path: str | Path, detector: FailureDetector | None = None, command: str = "") -> None:
+        """Write one model file, atomically, with the detector if given.
+
+        Parameters
+        ----------
+        command : what to type to make it again, kept in the file.
+        """
+        write_learned(path, {label: (p.primitive_, p.get_params()) for label, p in self.items()}, detector, command)
 
     def __getitem__(self, label: str) -> ProbabilisticDMP:
         if label not in self._primitives:

@@ -10,18 +10,23 @@ from probdmp.detection import FailureDetector
 from probdmp.dmp import Primitive
 from probdmp.errors import InputError
 from probdmp.io import ModelContents, write_model
+from probdmp.io.model_contents import provenance_here
 
 __all__ = ["write_learned"]
 
 
 def write_learned(
-    path: str | Path, learned: Mapping[str, tuple[Primitive, Mapping[str, Any]]], detector: FailureDetector | None
+    path: str | Path,
+    learned: Mapping[str, tuple[Primitive, Mapping[str, Any]]],
+    detector: FailureDetector | None,
+    command: str = "",
 ) -> None:
     """Write a model file, atomically.
 
     Parameters
     ----------
     learned : by label, a primitive and the constructor arguments of its estimator.
+    command : what to type to make the file again.
 
     Raises
     ------
@@ -33,7 +38,8 @@ def write_learned(
     if detector is not None and _identities(detector.primitives_) != _identities(primitives):
         raise InputError("a detector fitted to these primitives", "one for others", "Fit it to them first.")
     settings = {label: _plain(parameters) for label, (_, parameters) in learned.items()}
-    write_model(path, ModelContents(primitives, settings, state))
+    made = {**provenance_here(), **({"command": command} if command else {})}
+    write_model(path, ModelContents(primitives, settings, state, made))
 
 
 def _identities(primitives: Mapping[str, Primitive]) -> set[str]:

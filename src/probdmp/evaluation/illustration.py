@@ -15,7 +15,7 @@ from probdmp.evaluation.judges import READINGS, fit_paper_detector
 from probdmp.evaluation.trials import commanded_tasks, draw_trials
 from probdmp.execution import GaussianTrajectory, roll_out
 
-__all__ = ["Illustration", "JudgedExecution", "illustrate"]
+__all__ = ["Illustration", "JudgedExecution", "illustrate", "judge_execution"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,8 +24,12 @@ class JudgedExecution:
 
     recording: Demonstration
     statistic: FloatArray
-    """(T,) array, nats: log-likelihood with positions in units of their range."""
+    """(T,) array, nats: log-likelihood with positions in units of their range; infinite where nothing was seen."""
+    test_ratios: FloatArray
+    """(T,) array: statistic of the detector over its threshold, above 1 for an alarm."""
     verdict: Verdict
+    level: float | None
+    """With the paper's rule, the log-likelihood below which an execution has failed, nats."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,7 +63,7 @@ def illustrate(demonstrations: Sequence[Demonstration], experiment: Experiment, 
     primitive, detector = fit_paper_detector(trial, READINGS[0], experiment)
     tasks = commanded_tasks(primitive, trial.tests, experiment.task)
     pairs = [
-        (_judge(detector, primitive, task, test), _judge(detector, primitive, task, faulty))
+        (judge_execution(detector, primitive, task, test), judge_execution(detector, primitive, task, faulty))
         for task, test, faulty in zip(tasks, trial.tests, trial.faulty[fault], strict=True)
     ]
     right = [not undisturbed.verdict.failed and disturbed.verdict.failed for undisturbed, disturbed in pairs]
@@ -77,8 +81,11 @@ def illustrate(demonstrations: Sequence[Demonstration], experiment: Experiment, 
     )
 
 
-def _judge(detector: FailureDetector, primitive: Primitive, task: Task, recording: Demonstration) -> JudgedExecution:
-    statistic = LikelihoodStatistic(detector.likelihood, primitive.ranges)
-    ticks = next(replay(primitive, [task], [recording]))
-    values = np.array([statistic.update(observed)[0] for observed in ticks])
-    return JudgedExecution(recording, values, detector.verdicts([recording], tasks=[task])[0])
+def judge_execution(detector: FailureDetector, primitive: Primitive, task: Task, recording: Demonstration) -> JudgedExecution:
+    """One execution under the eyes of a detector, tick by tick; of any rule, the log-likelihood goes along."""
+    own_threshold = detector.thresholds_.get(primitive.identity)
+    statistic = LikelihoodStatistic(detector.likelihood if own_threshold else "per_step", primitive.ranges)
+    values = np.array([statistic.update(observed)[0] for observed in next(replay(primitive, [task], [recording]))])
+    ((monitor, ticks),) = detector.replay(primitive, [task], [recording])
+    ratios = np.array([monitor.update(observed) for observed in ticks])
+    return JudgedExecution(recording, values, ratios, monitor.verdict, own_threshold.level if own_threshold else None)

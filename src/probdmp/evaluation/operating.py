@@ -1,16 +1,33 @@
 """The same traces at other thresholds: what would have been detected, and how soon, had another alarm rate been asked for."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from probdmp.demonstrations import FAILURE, fault_named
 from probdmp.errors import InputError
 from probdmp.evaluation.metrics import Rate, rate_of
 from probdmp.evaluation.outcomes import Assessment, Finding, Outcome, Trace
 from probdmp.evaluation.trials import UNDISTURBED
 
-__all__ = ["RealizedRate", "at_level", "detected_within", "level_realizing", "realized_rates"]
+__all__ = [
+    "OperatingCurves",
+    "Promptness",
+    "RealizedRate",
+    "at_level",
+    "detected_within",
+    "has_traces",
+    "level_realizing",
+    "operating_curves",
+    "realized_rates",
+]
+
+LARGEST_RATE = 0.2
+"""Of false alarms, up to which operating curves go."""
+N_RATES = 41
+LATENCIES = tuple(round(k / 100, 2) for k in range(41))
+"""Fractions of the duration."""
 
 APART = ("sensor", "data missing")
 """Kinds of alarms that have thresholds of their own."""
@@ -29,6 +46,66 @@ class RealizedRate:
     """2.5 % quantile of the rate of the same number of executions, if those that calibrated are like them."""
     high: float
     """97.5 % quantile."""
+
+
+@dataclass(frozen=True, slots=True)
+class Promptness:
+    """How soon failures are detected at one threshold."""
+
+    nominal: float | None
+    """The rate of false alarms that the threshold is for; None: the threshold in force."""
+    detected: Mapping[str, tuple[float, ...]]
+    """By failure: share detected within each of the latencies."""
+
+
+@dataclass(frozen=True, slots=True)
+class OperatingCurves:
+    """What is detected when the threshold is moved, and how soon; rates are fractions from 0 to 1."""
+
+    false_alarms: tuple[float, ...]
+    """As they came about at each threshold, rising."""
+    detected: Mapping[str, tuple[float, ...]]
+    """By failure: share detected at each threshold."""
+    latencies: tuple[float, ...]
+    """Fractions of the duration since the onset."""
+    promptness: tuple[Promptness, ...]
+    """At several thresholds."""
+
+    def __post_init__(self) -> None:
+        lines = [(self.false_alarms, self.detected), *((self.latencies, one.detected) for one in self.promptness)]
+        for places, shares in lines:
+            if any(len(line) != len(places) for line in shares.values()):
+                raise InputError(f"curves of {len(places)} points", f"{sorted({len(line) for line in shares.values()})}")
+
+
+def has_traces(outcomes: Sequence[Outcome]) -> bool:
+    """Whether thresholds can be moved afterwards."""
+    return all(finding.trace is not None for outcome in outcomes for finding in outcome.findings.values())
+
+
+def operating_curves(outcomes: Sequence[Outcome], realized: Sequence[RealizedRate] = ()) -> OperatingCurves:
+    """The curves of one judge.
+
+    Parameters
+    ----------
+    outcomes : with traces.
+    realized : thresholds at which promptness is of interest; the one in force if there are none.
+    """
+    failures = [name for name in outcomes[0].onsets if fault_named(name).nature == FAILURE]
+    most = int(LARGEST_RATE * len(outcomes))
+    counts = sorted({round(k) for k in np.linspace(0, most, N_RATES)})
+    at = [at_level(outcomes, level_realizing(outcomes, count / len(outcomes))) for count in counts]
+    levels: dict[float | None, float] = {one.nominal: one.level for one in realized}
+    return OperatingCurves(
+        false_alarms=tuple(float(np.mean([o.false_alarm is not None for o in moved])) for moved in at),
+        detected={name: tuple(detected_within(moved, name, [np.finfo(float).max])[0] for moved in at) for name in failures},
+        latencies=LATENCIES,
+        promptness=tuple(
+            Promptness(nominal, {name: tuple(detected_within(moved, name, LATENCIES)) for name in failures})
+            for nominal, level in (levels or {None: 1.0}).items()
+            for moved in (at_level(outcomes, level),)
+        ),
+    )
 
 
 def level_realizing(outcomes: Sequence[Outcome], rate: float) -> float:

@@ -10,7 +10,9 @@ from probdmp.errors import InputError
 from probdmp.evaluation.experiment import Experiment
 from probdmp.evaluation.judges import DETECTORS, READINGS, Judge, Progress
 from probdmp.evaluation.metrics import BOOTSTRAP, CLOPPER_PEARSON
+from probdmp.evaluation.operating import has_traces, operating_curves, realized_rates
 from probdmp.evaluation.outcomes import Assessment, Outcome
+from probdmp.evaluation.record import EvaluationRecord, JudgeRecord
 from probdmp.evaluation.summary import Summary, published_summary, summarize
 from probdmp.evaluation.trials import draw_trials, group_by_label
 
@@ -35,37 +37,59 @@ class Evaluation:
         """The figures of each judge, over all seeds."""
         return {name: summarize(outcomes, len(self.by_seed)) for name, outcomes in self.outcomes.items()}
 
-    def as_dict(self) -> dict[str, Any]:
+    def record(self, command: str = "") -> EvaluationRecord:
+        """What is kept of it; with curves, if the judges kept their traces.
+
+        Parameters
+        ----------
+        command : what to type to get the same figures.
+        """
+        experiment = self.experiment
+        judges = tuple(self._judge_record(name, summary) for name, summary in self.summaries().items())
+        return EvaluationRecord(
+            classes=len({outcome.label for outcome in next(iter(self.outcomes.values()))}),
+            train=experiment.train,
+            test=experiment.test,
+            seed=experiment.seed,
+            seeds=experiment.seeds,
+            detector=experiment.detector,
+            task=experiment.task,
+            false_alarm_rate=experiment.false_alarm_rate if any(j.calibrations for j in judges) else None,
+            interval=CLOPPER_PEARSON if len(self.by_seed) == 1 else BOOTSTRAP,
+            judges=judges,
+            command=command,
+        )
+
+    def as_dict(self, command: str = "") -> dict[str, Any]:
         """The document that `probdmp evaluate --json` prints: the first judge at the top, then all of them."""
-        experiment, outcomes = self.experiment, self.outcomes
-        figures = [{"name": name, **_parts(name), **self._figures(name, s)} for name, s in self.summaries().items()]
-        first = group_by_label(next(iter(outcomes.values())))
+        experiment, record = self.experiment, self.record(command)
+        figures = [{**judge.as_dict(), **_parts(judge.name), **self._per_seed(judge.name)} for judge in record.judges]
+        first = group_by_label(next(iter(self.outcomes.values())))
         return {
-            "classes": len(first),
-            "train": experiment.train,
-            "test": experiment.test,
-            "seed": experiment.seed,
-            "seeds": experiment.seeds,
-            "detector": experiment.detector,
-            "task": experiment.task,
-            "false_alarm_rate": experiment.false_alarm_rate if any(f["calibrations"] for f in figures) else None,
+            **{name: value for name, value in asdict(replace(record, judges=())).items() if name != "judges"},
             "configuration": {
                 k: v for k, v in asdict(experiment.configuration_for(experiment.detector)).items() if k != "forcing_noise"
             },
-            "interval": CLOPPER_PEARSON if len(self.by_seed) == 1 else BOOTSTRAP,
             **figures[0],
             "readings": figures,
             "by_class": {label: _counts(members) for label, members in first.items()},
             "published": published_summary().as_dict(),
         }
 
-    def _figures(self, name: str, summary: Summary) -> dict[str, Any]:
-        assessments = {seed: split[name] for seed, split in self.by_seed.items()}
-        facts = [{"seed": seed, **asdict(one)} for seed, j in assessments.items() for one in j.calibrations]
-        figures = {**summary.as_dict(), "calibrations": facts}
-        if len(assessments) == 1:
-            return figures
-        return {**figures, "per_seed": [{"seed": seed, **summarize(j.outcomes).as_dict()} for seed, j in assessments.items()]}
+    def _judge_record(self, name: str, summary: Summary) -> JudgeRecord:
+        assessments, outcomes = [split[name] for split in self.by_seed.values()], self.outcomes[name]
+        calibrations = {seed: facts for seed, split in self.by_seed.items() if (facts := split[name].calibrations)}
+        if not has_traces(outcomes):
+            return JudgeRecord(name, summary, calibrations)
+        realized = tuple(realized_rates(assessments))
+        return JudgeRecord(name, summary, calibrations, realized, operating_curves(outcomes, realized))
+
+    def _per_seed(self, name: str) -> dict[str, Any]:
+        """The figures of each seed, if there are several."""
+        if len(self.by_seed) == 1:
+            return {}
+        each = [{"seed": seed, **summarize(split[name].outcomes).as_dict()} for seed, split in self.by_seed.items()]
+        return {"per_seed": each}
 
 
 def evaluate(

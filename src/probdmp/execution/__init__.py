@@ -9,7 +9,7 @@ from probdmp.execution.recordings import (
     task_of_recording,
     track_recording,
 )
-from probdmp.execution.rollout import roll_out, sample_trajectories
+from probdmp.execution.rollout import position_covariances, roll_out, sample_trajectories
 from probdmp.execution.trajectory import GaussianTrajectory, TrackedTrajectory
 
 __all__ = [
@@ -22,6 +22,7 @@ __all__ = [
     "TrackedTrajectory",
     "check_tasks",
     "filter_recordings",
+    "position_covariances",
     "roll_out",
     "sample_trajectories",
     "score_recordings",

@@ -27,6 +27,7 @@ from probdmp.gaussian import (
 __all__ = [
     "FilteredRecordings",
     "filter_joint",
+    "joint_position_covariances",
     "roll_out_joint",
     "sample_joint",
     "smooth_joint",
@@ -88,6 +89,19 @@ def roll_out_joint(executions: JointExecutions) -> GaussianSequence:
             deviation = predict_deviation(deviation, executions.system.transition, noise)
         moments.append(state_moments(executions.model, deviation, rows))
     return GaussianSequence(*(np.stack(m) for m in zip(*moments, strict=True)))
+
+
+def joint_position_covariances(executions: JointExecutions) -> FloatArray:
+    """Of `roll_out_joint`, what degrees of freedom share too: (T, N, D, D) array, data units squared."""
+    model, deviation = executions.model, start_deviation(executions.model)
+    covariances = []
+    for t, rows in enumerate(executions.rows):
+        if t > 0:
+            deviation = predict_deviation(deviation, executions.system.transition, executions.system.noise)
+        shared = linear_moments(model.belief, position_designs(model, rows)[1])[1]
+        own = deviation.covariance[..., POSITION, POSITION]  # nothing was observed, so deviations owe nothing to z
+        covariances.append(shared + own[..., None] * np.eye(own.shape[-1]))
+    return np.stack(covariances)
 
 
 def start_deviation(model: JointModel) -> Deviation:

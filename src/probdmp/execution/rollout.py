@@ -6,11 +6,11 @@ from probdmp.checks import FloatArray
 from probdmp.dmp import Primitive, Task, linear_gaussian_model, stack_tasks, step_count
 from probdmp.dmp.joint_model import joint_executions
 from probdmp.dmp.transformation_system import POSITION
-from probdmp.execution.joint_filtering import roll_out_joint, sample_joint
+from probdmp.execution.joint_filtering import joint_position_covariances, roll_out_joint, sample_joint
 from probdmp.execution.trajectory import GaussianTrajectory
 from probdmp.gaussian import filter_sequence, sample_sequences
 
-__all__ = ["roll_out", "sample_trajectories"]
+__all__ = ["position_covariances", "roll_out", "sample_trajectories"]
 
 
 def roll_out(primitive: Primitive, task: Task, dt: float) -> GaussianTrajectory:
@@ -27,6 +27,18 @@ def roll_out(primitive: Primitive, task: Task, dt: float) -> GaussianTrajectory:
         return GaussianTrajectory(times, means[:, 0], covariances[:, 0], primitive.names, primitive.units)
     rolled = filter_sequence(linear_gaussian_model(primitive, task, dt, n_steps)).filtered
     return GaussianTrajectory(times, rolled.means, rolled.covariances, primitive.names, primitive.units)
+
+
+def position_covariances(primitive: Primitive, task: Task, dt: float) -> FloatArray:
+    """Covariances of the positions of a rollout across degrees of freedom, (T, D, D) array, data units squared.
+
+    Only joint weights know how degrees of freedom vary together; else the matrices are diagonal.
+    """
+    if primitive.configuration.weight_uncertainty == "joint":
+        n_steps = step_count(float(task.duration), dt)
+        return joint_position_covariances(joint_executions(primitive, stack_tasks([task]), np.array([dt]), n_steps))[:, 0]
+    stds = roll_out(primitive, task, dt).position_stds
+    return stds[..., None] ** 2 * np.eye(primitive.n_dof)
 
 
 def sample_trajectories(

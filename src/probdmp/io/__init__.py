@@ -2,6 +2,7 @@
 
 from probdmp.io.atomic import write_atomically
 from probdmp.io.formats import read_demonstrations, write_demonstrations
+from probdmp.io.json_document import read_json
 from probdmp.io.model_contents import ModelContents
 from probdmp.io.model_file import decode_model, encode_model, read_model, write_model
 from probdmp.io.npz import read_npz, write_npz
@@ -11,6 +12,7 @@ __all__ = [
     "decode_model",
     "encode_model",
     "read_demonstrations",
+    "read_json",
     "read_model",
     "read_npz",
     "write_atomically",

@@ -12,10 +12,11 @@ from probdmp.dmp import Primitive
 from probdmp.errors import InputError, InputTypeError
 from probdmp.io.canonical_json import dump_json
 
-__all__ = ["ModelContents"]
+__all__ = ["ModelContents", "provenance_here"]
 
 
-def _provenance_here() -> dict[str, str]:
+def provenance_here() -> dict[str, str]:
+    """The version of probdmp and the time, UTC."""
     return {"probdmp": __version__, "created": datetime.now(UTC).isoformat(timespec="seconds")}
 
 
@@ -35,8 +36,8 @@ class ModelContents:
     """By label, constructor arguments of the estimator: numbers, text, booleans, None, and lists and dicts of these."""
     detector: Mapping[str, Any] | None = None
     """State of the detector, of the same kinds."""
-    provenance: Mapping[str, str] = field(default_factory=_provenance_here)
-    """Where the model comes from; unless given, the version of probdmp and the time, UTC."""
+    provenance: Mapping[str, str] = field(default_factory=provenance_here)
+    """Where the model comes from; unless given, the version of probdmp and the time, UTC; perhaps the `"command"`."""
 
     def __post_init__(self) -> None:
         for name in (own.name for own in fields(self)):

@@ -1,13 +1,12 @@
-"""The tables of a report, as HTML."""
+"""The tables of reports, as HTML."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from html import escape
+from collections.abc import Callable, Mapping, Sequence
 
 from probdmp.detection import CalibrationFacts
-from probdmp.evaluation import Evaluation, FaultSummary, Rate, Summary, published_summary
-from probdmp.evaluation.operating import RealizedRate
+from probdmp.evaluation import EvaluationRecord, FaultSummary, Rate, RealizedRate, Summary, published_summary
+from probdmp.plotting.page import table
 
-__all__ = ["calibration_table", "comparison_table", "fault_tables", "percent", "realized_table"]
+__all__ = ["calibration_table", "comparison_table", "fault_tables", "is_papers", "percent", "realized_table"]
 
 NATURES: Sequence[tuple[str, tuple[str, str], Callable[[FaultSummary], Rate | None]]] = (
     ("failure", ("Failure", "Detected at or after the onset"), lambda figures: figures.detected),
@@ -20,17 +19,18 @@ NATURES: Sequence[tuple[str, tuple[str, str], Callable[[FaultSummary], Rate | No
 LATENCY = "Latency, median / p95"
 
 
-def comparison_table(evaluation: Evaluation, fault: str) -> str:
+def comparison_table(record: EvaluationRecord, fault: str) -> str:
     """A row for each judge, the published figures first."""
     rows = []
-    for name, summary in {"the paper, as published": published_summary(), **evaluation.summaries()}.items():
+    summaries = {judge.name: judge.summary for judge in record.judges}
+    for name, summary in {"the paper, as published": published_summary(), **summaries}.items():
         figures = summary.faults.get(fault)
         of_fault = ["–"] * 4
         if figures is not None:
             of_fault = [_rate(figures.detected), _rate(figures.ever), _latency(figures), _kinds(figures)]
-        rows.append([_named(name), _rate(summary.false_alarms), *of_fault])
+        rows.append([f"the paper's rule: {name}" if is_papers(name) else name, _rate(summary.false_alarms), *of_fault])
     heads = ("Judge", "False alarms", f"{fault}: at or after the onset", f"{fault}: at any time", LATENCY, "Said to be")
-    return _table(heads, rows)
+    return table(heads, rows)
 
 
 def fault_tables(summary: Summary) -> str:
@@ -38,20 +38,20 @@ def fault_tables(summary: Summary) -> str:
     tables = []
     for nature, heads, headline in NATURES:
         rows = [
-            [name, _rate(headline(figures)), percent(figures.ever.rate), _latency(figures), _kinds(figures)]
+            [name, _rate(headline(figures)), _rate(figures.ever), _latency(figures), _kinds(figures)]
             for name, figures in summary.faults.items()
             if figures.nature == nature
         ]
         if rows:
-            tables.append(_table((*heads, "At any time", LATENCY, "Said to be"), rows))
+            tables.append(table((*heads, "At any time", LATENCY, "Said to be"), rows))
     return "\n".join(tables)
 
 
-def calibration_table(calibrations: Mapping[int, Sequence[CalibrationFacts]]) -> str:
-    """Where thresholds come from, by seed."""
+def calibration_table(calibrations: Mapping[int, Sequence[CalibrationFacts]], by_seed: bool = True) -> str:
+    """Where thresholds come from: a row for each, with the seed or, of a model, with the task it is for."""
     rows = [
         [
-            str(seed),
+            str(seed) if by_seed else facts.task,
             facts.label or "shared",
             str(facts.n),
             percent(facts.false_alarm_rate),
@@ -64,23 +64,24 @@ def calibration_table(calibrations: Mapping[int, Sequence[CalibrationFacts]]) ->
         for seed, several in calibrations.items()
         for facts in several
     ]
-    return _table(("Seed", "Threshold", "n", "α", "Attainable", "Method", "Guarantee", "Nats", "Flagged"), rows)
+    first = "Seed" if by_seed else "Task"
+    return table((first, "For", "n", "α", "Attainable", "Method", "Guarantee", "Threshold [nats]", "Flagged"), rows)
 
 
 def realized_table(realized: Sequence[RealizedRate]) -> str:
     """False alarms at several nominal rates."""
     rows = [[percent(one.nominal), _rate(one.realized), f"{100 * one.low:.1f}–{percent(one.high)}"] for one in realized]
-    return _table(("α", "Realised", "Limits of chance, one split"), rows)
+    return table(("α", "Realised", "Limits of chance, one split"), rows)
 
 
 def percent(fraction: float) -> str:
-    """A fraction in percent, with one decimal unless it is a round number."""
-    return f"{100 * fraction:.1f} %".replace(".0 %", " %")
+    """A fraction in percent, with one decimal unless it is a round number; the space does not break."""
+    return f"{100 * fraction:.1f} %".replace(".0 %", " %").replace(" ", "\N{NO-BREAK SPACE}")
 
 
-def _named(name: str) -> str:
-    """Readings of the paper's rule are called so."""
-    return f"the paper's rule: {name}" if name.startswith(("predictive", "posterior")) else name
+def is_papers(name: str) -> bool:
+    """Whether a judge is a reading of the paper's rule."""
+    return name.startswith(("predictive", "posterior", "between"))
 
 
 def _kinds(figures: FaultSummary) -> str:
@@ -98,15 +99,3 @@ def _latency(figures: FaultSummary) -> str:
 def _rate(rate: Rate | None) -> str:
     """Count and rate, and on a second line the interval."""
     return "–" if rate is None else f"{rate.count}/{rate.n} {percent(rate.rate)}\n{100 * rate.low:.1f}–{percent(rate.high)}"
-
-
-def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    head = "".join(f"<th>{escape(text)}" for text in heads)
-    body = "\n".join("<tr>" + "".join(f"<td>{_cell(cell)}" for cell in row) for row in rows)
-    return f'<div class="wide"><table>\n<tr>{head}\n{body}\n</table></div>'
-
-
-def _cell(text: str) -> str:
-    """The first line, and smaller what stands below it."""
-    first, _, second = text.partition("\n")
-    return f"{escape(first)}<small>{escape(second)}</small>" if second else escape(first)
