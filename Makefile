@@ -27,9 +27,9 @@ lint: $(VENV)/.dev
 types: $(VENV)/.dev
 	$(BIN)/mypy
 
-# The documentation as a site in build/site; any warning ends it. It loads nothing from elsewhere: open build/site/index.html.
+# The documentation as a site in build/site. Any warning ends it, but not with --quiet, which would hide them from --strict too.
 docs: $(VENV)/.docs gallery
-	$(BIN)/mkdocs build --quiet --strict
+	$(BIN)/mkdocs build --strict
 
 # A picture, and what was printed, of every example: the gallery of the site.
 gallery: $(GALLERY)

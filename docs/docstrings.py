@@ -1,7 +1,7 @@
 """The manner of this project's docstrings, for mkdocstrings: `name : what it is`, with the type in the signature alone.
 
 NumPy's manner has the type behind the colon and the description below. An extension of griffe moves the text there before
-it is parsed, so that the types come from the annotations. Prose under Returns is kept as prose.
+it is parsed, so that the types come from the annotations.
 """
 
 import re
@@ -9,7 +9,8 @@ from typing import Any
 
 from griffe import Attribute, Class, Extension, Function, Module
 
-ENTRIES = ("Parameters", "Attributes")
+MOVED = ("Parameters", "Attributes", "Returns")
+UNDERLINE = re.compile(r"-{3,}")
 
 
 def in_numpy_manner(text: str) -> str:
@@ -17,15 +18,16 @@ def in_numpy_manner(text: str) -> str:
     lines, section, converted = text.split("\n"), "", []
     for k, line in enumerate(lines):
         following = lines[k + 1] if k + 1 < len(lines) else ""
-        if re.fullmatch(r"-{3,}", following):
+        if UNDERLINE.fullmatch(following):
             section = line
-            if section == "Returns":
-                converted.append("**Returns**\n")
-                continue
-        if section == "Returns" and re.fullmatch(r"-{3,}", line):
-            continue
-        entry = re.fullmatch(r"([\w*, ]+?) : (.*)", line) if section in ENTRIES else None
-        converted += [entry[1], f"    {entry[2]}"] if entry else [line]
+        if UNDERLINE.fullmatch(line) or UNDERLINE.fullmatch(following) or section not in MOVED:
+            converted.append(line)
+        elif section == "Returns":
+            first = UNDERLINE.fullmatch(lines[k - 1])
+            converted += ([":"] if first else []) + ([f"    {line}"] if line else [""])
+        else:
+            entry = re.fullmatch(r"([\w*, ]+?) : (.*)", line)
+            converted += [entry[1], f"    {entry[2]}"] if entry else [line]
     return re.sub(r"(?<=[(, ])\*(?=[a-z])", r"\*", "\n".join(converted))
 
 

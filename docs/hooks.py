@@ -16,7 +16,7 @@ from mkdocs.structure.pages import Page
 
 ROOT = Path(__file__).parent.parent
 PICTURES = ROOT / "build/gallery"
-GALLERY = "examples.md"
+GALLERY, MESSAGES = "examples.md", "troubleshooting.md"
 
 FENCE = re.compile(r"^```math\n(.*?)^```$", flags=re.M | re.S)
 INLINE = re.compile(r"\$`(.+?)`\$")
@@ -48,6 +48,15 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     )
     markdown = FENCE.sub(lambda formula: f'<div class="formula">{convert(formula[1].strip(), display="block")}</div>', markdown)
     return INLINE.sub(lambda formula: convert(formula[1]), markdown)
+
+
+def on_page_content(html: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Messages are headings, so that they can be found and linked to, but too long for a table of contents."""
+    if page.file.src_uri == MESSAGES:
+        for section in page.toc:
+            for part in section.children:
+                part.children = []
+    return html
 
 
 def _outside(uri: str, markdown: str) -> dict[str, str]:
