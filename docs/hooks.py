@@ -47,7 +47,7 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
         lambda link: _relative(uri, _source_page(outside[link[0]])) if link[0] in outside else link[0], markdown
     )
     markdown = FENCE.sub(lambda formula: f'<div class="formula">{convert(formula[1].strip(), display="block")}</div>', markdown)
-    return INLINE.sub(lambda formula: convert(formula[1]), markdown)
+    return INLINE.sub(lambda formula: f'<span class="math">{convert(formula[1])}</span>', markdown)
 
 
 def on_page_content(html: str, page: Page, config: MkDocsConfig, files: Files) -> str:
