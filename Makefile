@@ -5,7 +5,11 @@ BIN := $(VENV)/bin
 
 BENCH := benchmarks/.venv
 
-.PHONY: demo test test-slow lint types figures results variation detection bench-env bench-detection clean
+# What pictures of the examples depend on: they are drawn again when the library changes.
+SOURCES := $(shell find src -name '*.py')
+GALLERY := $(patsubst examples/%.py,build/gallery/%.png,$(wildcard examples/*.py))
+
+.PHONY: demo test test-slow lint types docs gallery n-basis figures results variation detection bench-env bench-detection clean
 
 demo: $(VENV)/.demo
 	$(BIN)/probdmp demo
@@ -23,9 +27,24 @@ lint: $(VENV)/.dev
 types: $(VENV)/.dev
 	$(BIN)/mypy
 
-# Every picture in the documentation.
+# The documentation as a site in build/site. Any warning ends it, but not with --quiet, which would hide them from --strict too.
+docs: $(VENV)/.docs gallery
+	$(BIN)/mkdocs build --strict
+
+# A picture, and what was printed, of every example: the gallery of the site.
+gallery: $(GALLERY)
+
+build/gallery/%.png: examples/%.py $(SOURCES) | $(VENV)/.docs
+	mkdir -p build/gallery
+	MPLBACKEND=Agg $(BIN)/python $< $@ > $(@:.png=.txt)
+
+# Every picture in docs/images.
 figures: $(VENV)/.demo
 	$(BIN)/python docs/figures.py
+
+# The table and the picture in docs/how-to/choose-n-basis.md, from the built-in letters; about a minute.
+n-basis: $(VENV)/.demo
+	$(BIN)/python docs/n_basis.py
 
 # Every table in docs/paper.md, from the recordings that PROBDMP_RECORDINGS points at; about ten minutes.
 results: $(VENV)/.demo
@@ -51,6 +70,7 @@ clean:
 
 # A stamp per set of extras: installed again only when pyproject.toml changes.
 $(VENV)/.demo: EXTRA := plot
+$(VENV)/.docs: EXTRA := docs
 $(VENV)/.test: EXTRA := test
 $(VENV)/.dev: EXTRA := dev
 $(VENV)/.%: pyproject.toml

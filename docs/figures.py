@@ -1,83 +1,149 @@
-"""Draws every picture of the documentation: `make figures`."""
+"""Draws every picture of docs/images but that of n_basis: `make figures`."""
 
+import runpy
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from movement_figures import draw_arm_movements, draw_letter_speeds, draw_letters
 
-from probdmp import synthetic_arm_movements, synthetic_letters
-from probdmp.demonstrations import ARM_MOVEMENTS, LETTERS, written_letters
-from probdmp.demonstrations.sigma_lognormal import speeds
+from probdmp import Demonstration, GaussianTrajectory, ProbabilisticDMP, synthetic_letters
+from probdmp.dmp.basis import basis_features
+from probdmp.dmp.forcing_term import forcing_term
+from probdmp.dmp.phase import phases_at
 from probdmp.evaluation import Experiment, illustrate
 from probdmp.plotting.failure_detection import failure_detection_panels
 from probdmp.plotting.panels import tiled
-from probdmp.plotting.style import MEAN, figure_style, series
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from probdmp.plotting.style import ALARM, FAULTY, MEAN, RECORDED, band, figure_style
+from probdmp.plotting.trajectories import plot_rollout
 
 IMAGES = Path(__file__).parent / "images"
+EXAMPLES = Path(__file__).parent.parent / "examples"
+TAUGHT = 10
 
 
-def failure_detection() -> "Figure":
+def draw_likelihood() -> Figure:
     """The paper's figure."""
     experiment = Experiment()
-    shown = illustrate(synthetic_letters(experiment.train + experiment.test, letters="a"), experiment)
-    return tiled(failure_detection_panels(shown), 3)
+    letters = synthetic_letters(experiment.train + experiment.test, letters="a")
+    return tiled(failure_detection_panels(illustrate(letters, experiment)), 3)
 
 
-def letters(repetitions: int = 6, per_row: int = 3, pitch: float = 22.0) -> "Figure":
-    """A contact sheet: each letter so many times, `pitch` millimetres apart."""
-    rows = -(-len(LETTERS) // per_row)
-    figure, axes = plt.subplots(rows, per_row, figsize=(11, 1.15 * rows), sharex=True, sharey=True, layout="constrained")
-    for k, ax in enumerate(axes.flat):
-        ax.set_aspect("equal")
-        ax.axis("off")
-        for place, demonstration in enumerate(synthetic_letters(repetitions, letters=LETTERS[k]) if k < len(LETTERS) else ()):
-            ax.plot(demonstration.positions[:, 0] + pitch * place, demonstration.positions[:, 1], color="k", linewidth=1.2)
+def draw_dmp() -> Figure:
+    """Basis functions, the forcing term that they make, and what it does to the path."""
+    learned = ProbabilisticDMP(10).fit(synthetic_letters(TAUGHT, letters="a"))
+    rollout = learned.rollout()
+    times, duration = rollout.times, learned.primitive_.duration
+    phases = phases_at(times, duration)
+    figure, (basis, forcing, path) = plt.subplots(1, 3, figsize=(10, 3), layout="constrained")
+    basis.plot(times, basis_features(phases, 10), color=MEAN, linewidth=1)
+    basis.plot(times, phases, color="0.6", linestyle="--")
+    basis.text(times[12], phases[8], "phase", fontsize=8, color="0.4")
+    basis.set(xlabel="Time [s]", title="1. Basis functions of the phase")
+    forcing.axhline(0, color="0.8", linewidth=1)
+    forcing.plot(times, forcing_term(learned.primitive_, phases).means)
+    forcing.lines[1].set_color(MEAN)
+    forcing.lines[2].set_color(FAULTY)
+    forcing.legend(forcing.lines[1:], rollout.names)
+    forcing.set(xlabel="Time [s]", ylabel="f [mm]", title="2. Weighted: the forcing term")
+    path.plot(*rollout.positions.T, color=MEAN, label="with it")
+    ends = np.stack([rollout.positions[0], rollout.positions[-1]])
+    path.plot(*ends.T, color="0.6", linestyle="--", label="spring and damper alone")
+    path.plot(*ends[:1].T, "o", color=RECORDED)
+    path.plot(*ends[1:].T, "o", color=ALARM)
+    path.annotate("start", ends[0], (4, 6), textcoords="offset points", fontsize=8)
+    path.annotate("goal", ends[1], (4, 6), textcoords="offset points", fontsize=8)
+    path.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", title="3. The path", ylim=(-2, 14))
+    path.legend(loc="upper left", bbox_to_anchor=(0, 1.02), ncols=2, columnspacing=0.8)
     return figure
 
 
-def letter_speeds(shown: str = "aes") -> "Figure":
-    """How fast the pen is, and the lognormal strokes behind it."""
-    figure, axes = plt.subplots(1, len(shown), figsize=(11, 2.4), sharey=True, layout="constrained")
-    for ax, letter in zip(axes, shown, strict=True):
-        (written,) = written_letters(1, letters=letter)
-        times = written.demonstration.times
-        for k, stroke in enumerate(speeds(written.strokes, times).T):
-            ax.plot(times, stroke, linewidth=1, **series(k + 1), label="strokes" if k == 0 else None)
-        ax.plot(times, np.linalg.norm(written.velocities, axis=1), color=MEAN, linewidth=2, label="pen")
-        ax.set_title(letter)
-        ax.set_xlabel("Time [s]")
-    axes[0].set_ylabel("Speed [mm/s]")
-    axes[0].legend()
+def draw_system() -> Figure:
+    """States, inputs and measurements, and which depends on which."""
+    figure, ax = plt.subplots(figsize=(7, 2.5), layout="constrained")
+    rows = {"u": (2.0, "0.93", "forcing term and goal"), "s": (1.0, "#9db8d9", "state"), "o": (0.0, "white", "measurement")}
+    for name, (y, color, words) in rows.items():
+        ax.text(-0.75, y, words, ha="right", va="center", fontsize=9)
+        for x, index in enumerate(("t-1", "t", "t+1")):
+            ax.scatter(2 * x, y, s=750, color=color, edgecolor=MEAN, zorder=2)
+            ax.text(2 * x, y, f"${name}_{{{index}}}$", ha="center", va="center", fontsize=11, zorder=3)
+    arrow = {"arrowstyle": "-|>", "color": MEAN, "shrinkA": 15, "shrinkB": 15}
+    for x in (0, 2, 4):
+        ax.annotate("", (x, 0), (x, 1), arrowprops=arrow)
+        ax.annotate("", (x + 2, 1), (x, 1), arrowprops=arrow)
+        if x < 4:
+            ax.annotate("", (x + 2, 1), (x, 2), arrowprops=arrow)
+    ax.text(1, 1.1, "A", ha="center", fontsize=9)
+    ax.text(1.15, 1.6, "B", ha="center", fontsize=9)
+    ax.text(0.12, 0.5, "C", ha="left", va="center", fontsize=9)
+    ax.set(xlim=(-3.2, 6.2), ylim=(-0.5, 2.5))
+    ax.set_axis_off()
     return figure
 
 
-def arm_movements(executions: int = 5) -> "Figure":
-    """Positions over time with the via-points; one execution strong, the others faint."""
-    figure, axes = plt.subplots(2, 3, figsize=(11, 4.6), layout="constrained")
-    for ax, name in zip(axes.flat, ARM_MOVEMENTS, strict=True):
-        for k, movement in enumerate(reversed(synthetic_arm_movements(executions, movements=(name,)))):
-            first, names = k == executions - 1, movement.demonstration.names
-            for d, positions in enumerate(movement.positions.T):
-                style = {**series(d), "label": names[d], "linewidth": 1.8} if first else {"color": "0.8", "linewidth": 0.8}
-                ax.plot(movement.demonstration.times, positions, **style)
-            if first:
-                ax.plot(movement.via_times, movement.via_points, "k.", markersize=4)
-        ax.set_title(name)
-        ax.set_xlabel("Time [s]")
-        ax.set_ylabel(f"Position [{movement.demonstration.units}]")
-    for ax in axes[:, -1]:
-        ax.legend(loc="center left", bbox_to_anchor=(1, 0.5))
+def draw_uncertainty() -> Figure:
+    """The bands of the paper's model and of the library's, with executions that neither has seen."""
+    letters = synthetic_letters(TAUGHT + 12, letters="a")
+    models = {
+        "How sure of the mean movement (the paper)": ProbabilisticDMP.as_published(),
+        "How executions differ (the default)": ProbabilisticDMP(),
+    }
+    figure, axes = plt.subplots(1, 2, figsize=(9, 3), layout="constrained", sharey=True)
+    for ax, (title, model) in zip(axes, models.items(), strict=True):
+        rollout = model.fit(letters[:TAUGHT]).rollout()
+        plot_rollout(ax, rollout, 0).set_title(title)
+        _beside(ax, rollout, letters[TAUGHT:])
+    axes[1].plot([], [], color=RECORDED, linewidth=0.8, label="12 other executions")
+    axes[1].legend(loc="lower right")
     return figure
+
+
+def _beside(ax: Axes, rollout: GaussianTrajectory, executions: list[Demonstration]) -> None:
+    """Executions, moved to the start of the rollout and stretched to its duration."""
+    for execution in executions:
+        path = execution.positions[:, 0] - execution.positions[0, 0] + rollout.positions[0, 0]
+        ax.plot(np.linspace(0, rollout.times[-1], len(path)), path, color=RECORDED, linewidth=0.7)
+
+
+def draw_belief() -> Figure:
+    """What an execution so far says about its rest."""
+    letters = synthetic_letters(TAUGHT + 2, letters="a")
+    learned, execution = ProbabilisticDMP().fit(letters[:TAUGHT]), letters[TAUGHT + 1]
+    figure, axes = plt.subplots(1, 3, figsize=(10, 3), layout="constrained", sharey=True)
+    for ax, share in zip(axes, (0.0, 0.25, 0.5), strict=True):
+        seen = execution.positions.copy()
+        n_seen = max(1, int(share * len(seen)))
+        seen[n_seen:] = np.nan
+        belief = learned.smooth(seen, execution.dt, goal=execution.positions[-1])
+        band(ax, belief.times, belief.positions[:, 0], belief.position_stds[:, 0])
+        ax.plot(execution.times, execution.positions[:, 0], color=FAULTY, linestyle="--", linewidth=1, label="still to come")
+        ax.plot(execution.times[:n_seen], seen[:n_seen, 0], color=RECORDED, linewidth=2.5, label="measured")
+        ax.set(xlabel="Time [s]", title=f"{100 * share:.0f} % seen" if share else "The start is seen")
+    axes[0].set_ylabel("x position [mm]")
+    axes[2].legend(loc="lower right")
+    return figure
+
+
+PICTURES: dict[str, Callable[[], Figure]] = {
+    "failure_detection": draw_likelihood,
+    "dmp": draw_dmp,
+    "system": draw_system,
+    "uncertainty": draw_uncertainty,
+    "belief": draw_belief,
+    "letters": draw_letters,
+    "letter_speeds": draw_letter_speeds,
+    "arm_movements": draw_arm_movements,
+}
 
 
 def main() -> None:
     with figure_style():
-        for draw in (failure_detection, letters, letter_speeds, arm_movements):
-            draw().savefig(IMAGES / f"{draw.__name__}.png", dpi=150)
+        for name, draw in PICTURES.items():
+            draw().savefig(IMAGES / f"{name}.png", dpi=150)
+    runpy.run_path(str(EXAMPLES / "06_detect_a_failure.py"))["main"](IMAGES / "alarm.png")
 
 
 if __name__ == "__main__":

@@ -1,0 +1,141 @@
+"""Every message in docs/troubleshooting.md is one that probdmp says, word for word but for what stands for `…`."""
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from probdmp import (
+    Demonstration,
+    FailureDetector,
+    PrimitiveLibrary,
+    ProbabilisticDMP,
+    ProbDMPError,
+    Task,
+    demonstration_from_times,
+    load,
+    read_demonstrations,
+    synthetic_letters,
+    write_demonstrations,
+)
+from probdmp.cli import app
+from probdmp.plotting.style import require_matplotlib
+
+PAGE = Path(__file__).parent.parent / "docs/troubleshooting.md"
+QUOTED = re.findall(r"^### `(.*)`$", PAGE.read_text(), flags=re.M)
+
+PATH = np.linspace(0.0, 1.0, 60)[:, None] ** [1.0, 2.0]
+ONE = Demonstration(PATH, 0.01)
+GAP = np.where(np.arange(60)[:, None] < 10, np.nan, PATH)
+LETTERS = synthetic_letters(4, letters="c", dt=0.02)
+OTHERS = synthetic_letters(4, letters="c", dt=0.02, seed=1)
+
+
+def dmp(**settings: Any) -> ProbabilisticDMP:
+    return ProbabilisticDMP(8, **settings).fit(LETTERS)
+
+
+def detector(learned: ProbabilisticDMP) -> FailureDetector:
+    return FailureDetector(0.3).fit(learned, LETTERS)
+
+
+PROVOKED: list[Callable[[], Any]] = [
+    lambda: ProbabilisticDMP().fit(PATH, dt=0.01),
+    lambda: ProbabilisticDMP().fit("letters.npz"),
+    lambda: ProbabilisticDMP().fit([PATH]),
+    lambda: Demonstration(PATH[:, 0], 0.01),
+    lambda: Demonstration(PATH[:2], 0.01),
+    lambda: Demonstration(np.where(PATH > 0.9, np.inf, PATH), 0.01),
+    lambda: Demonstration([["1.0", "2.0"]] * 9, 0.01),
+    lambda: Demonstration(PATH, -0.01),
+    lambda: Demonstration(PATH, 0.01, names=("x", "x")),
+    lambda: ProbabilisticDMP().fit([ONE, Demonstration(PATH, 0.01, names=("x", "y"))]),
+    lambda: ProbabilisticDMP().fit([Demonstration(GAP, 0.01)]),
+    lambda: ProbabilisticDMP().fit([Demonstration(1e-60 * PATH, 0.01)]),
+    lambda: demonstration_from_times([0.0, 0.1, 0.1], PATH[:3]),
+    lambda: ProbabilisticDMP(scaling="paper", weight_uncertainty="independent").fit([ONE]),
+    lambda: ProbabilisticDMP(n_basis=0).fit([ONE]),
+    lambda: ProbabilisticDMP(weight_model="bayes").fit([ONE]),
+    lambda: ProbabilisticDMP().rollout(),
+    lambda: dmp().rollout(goal=[1.0, 2.0, 3.0]),
+    lambda: dmp().rollout(duration=1000, dt=0.001),
+    lambda: dmp(discretization="semi_implicit_euler").rollout(dt=0.2),
+    lambda: dmp().execute().step([1.0]),
+    lambda: dmp().track(np.zeros((50, 3)), dt=0.01),
+    lambda: dmp().track(Demonstration(PATH, 0.01, names=("x", "y"), units="m")),
+    lambda: dmp(weight_uncertainty="independent").condition([(0.2, [0.0, 0.0], 0.1)]),
+    lambda: dmp().condition([(20.0, [0.0, 0.0], 0.1)]),
+    lambda: FailureDetector(1.5).fit(dmp(), LETTERS),
+    lambda: FailureDetector().predict(LETTERS),
+    lambda: FailureDetector().fit(dmp(), OTHERS),
+    lambda: FailureDetector(calibration="held_out").fit(dmp(), LETTERS),
+    lambda: FailureDetector().fit(dmp(weight_model="pooled", weight_uncertainty="independent"), LETTERS),
+    lambda: FailureDetector().fit(ProbabilisticDMP(8).fit(LETTERS[:1]), LETTERS[:1]),
+    lambda: ProbabilisticDMP(8).fit(OTHERS).execute(detector=detector(dmp())),
+    lambda: FailureDetector(0.3).fit(PrimitiveLibrary({"c": dmp()}), {"c": LETTERS}).predict(synthetic_letters(1, letters="o")),
+    lambda: detector(dmp()).predict(LETTERS, tasks=[Task([0.0, 0.0], [1.0, 1.0], 1.0)]),
+    lambda: PrimitiveLibrary({"c": dmp()})["d"],
+    lambda: read_demonstrations("letters.txt"),
+    lambda: read_demonstrations("nowhere.npz"),
+    lambda: (Path("broken.npz").write_text("x"), read_demonstrations("broken.npz")),
+    lambda: (
+        write_demonstrations("named.npz", [Demonstration(PATH, 0.01, names=("left", "right"))]),
+        np.savez("named.npz", **{k: v for k, v in np.load("named.npz").items() if k != "positions"}),
+        read_demonstrations("named.npz"),
+    ),
+    lambda: (write_demonstrations("letters.npz", LETTERS), read_demonstrations("letters.npz", label="q")),
+    lambda: (Path("broken.probdmp").write_bytes(b"12345678" * 9), load("broken.probdmp")),
+    lambda: (PrimitiveLibrary({"c": dmp(), "d": dmp()}).save("two.probdmp"), load("two.probdmp")),
+    lambda: ProbabilisticDMP(8).fit(OTHERS).save("c.probdmp", detector(dmp())),
+]
+
+SAID: list[tuple[str, ...]] = [
+    ("fit", "letters.npz", "-o", "letters.txt"),
+    ("fit", "single.npz", "-o", "single.probdmp"),
+    ("rollout", "two.probdmp"),
+    ("rollout", "two.probdmp", "--label", "c", "--goal", "1;2"),
+    ("track", "two.probdmp", "letters.npz", "--label", "c", "--index", "9"),
+    ("monitor", "two.probdmp", "letters.npz"),
+    ("evaluate", "letters.npz"),
+    ("monitor", "watched.probdmp", "-"),
+]
+"""Commands that end in an error, after the files that they read were written."""
+
+
+@pytest.fixture(scope="module")
+def messages(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """What probdmp says when it is provoked."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(tmp_path_factory.mktemp("trouble"))
+        found = [_message(provoke) for provoke in PROVOKED]
+        write_demonstrations("single.npz", LETTERS[:1])
+        learned = dmp()
+        learned.save("watched.probdmp", detector(learned))
+        ticks = json.dumps({"position": [1.0, 2.0]}) + "\n" + json.dumps({"positions": 3}) + "\n"
+        found += [CliRunner().invoke(app, list(words), input=ticks, prog_name="probdmp").stderr.strip() for words in SAID]
+        patch.setattr("probdmp.plotting.style.find_spec", lambda name: None)
+        return [*found, _message(require_matplotlib)]
+
+
+def _message(provoke: Callable[[], Any]) -> str:
+    with pytest.raises(ProbDMPError) as caught:
+        provoke()
+    return str(caught.value)
+
+
+def pattern(quoted: str) -> str:
+    return ".*".join(re.escape(part) for part in quoted.split("…"))
+
+
+@pytest.mark.parametrize("quoted", QUOTED)
+def test_a_quoted_message_is_one_that_probdmp_says(quoted: str, messages: list[str]) -> None:
+    assert any(re.fullmatch(pattern(quoted), message) for message in messages)
+
+
+def test_what_probdmp_says_is_in_the_document(messages: list[str]) -> None:
+    assert not [message for message in messages if not any(re.fullmatch(pattern(quoted), message) for quoted in QUOTED)]
