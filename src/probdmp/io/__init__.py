@@ -1,6 +1,7 @@
 """Files to values and back: demonstrations in several formats, models in one that can be trusted."""
 
 from probdmp.io.atomic import write_atomically
+from probdmp.io.csv import read_csv, write_csv
 from probdmp.io.formats import read_demonstrations, write_demonstrations
 from probdmp.io.model_contents import ModelContents
 from probdmp.io.model_file import decode_model, encode_model, read_model, write_model
@@ -10,10 +11,12 @@ __all__ = [
     "ModelContents",
     "decode_model",
     "encode_model",
+    "read_csv",
     "read_demonstrations",
     "read_model",
     "read_npz",
     "write_atomically",
+    "write_csv",
     "write_demonstrations",
     "write_model",
     "write_npz",
