@@ -11,7 +11,7 @@ import typer
 from probdmp.cli.detector_choice import DEFAULT_RATE, FalseAlarmRate
 from probdmp.cli.evaluation_table import print_evaluation
 from probdmp.cli.exit_codes import UsageError, usage
-from probdmp.cli.options import Columns, Json, Seed, check_output, names_of
+from probdmp.cli.options import Columns, Json, RecordingFiles, SampleStep, Seed, check_output, names_of
 from probdmp.cli.output import print_json, print_line
 from probdmp.cli.progress import progress
 from probdmp.cli.recordings import read_files
@@ -35,8 +35,9 @@ Test = Annotated[int, typer.Option(metavar="N", help="Other demonstrations per c
 
 
 def evaluate(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="Labelled demonstrations (.npz).", show_default=False)],
+    files: RecordingFiles,
     columns: Columns = None,
+    dt: SampleStep = None,
     train: Train = 10,
     test: Test = 10,
     seed: Seed = 0,
@@ -83,14 +84,15 @@ def evaluate(
 
         require_matplotlib()
         experiment = replace(experiment, traces=True)
-    demonstrations = read_files([file], names_of(columns))
+    demonstrations = read_files(files, names_of(columns), dt=dt)
     result = evaluation_of(demonstrations, experiment)
     if as_json:
         print_json(result.as_dict())
     else:
         print_evaluation(result)
     if report is not None:
-        write_evaluation(report, result, demonstrations, _command(file, columns, experiment, configuration))
+        given = [*map(str, files), *_given("--columns", columns), *_given("--dt", dt)]
+        write_evaluation(report, result, demonstrations, _command(given, experiment, configuration))
         if not as_json:
             print_line(f"Report: {report}")
 
@@ -142,15 +144,19 @@ def write_evaluation(path: Path, result: "Evaluation", demonstrations: Sequence[
     write_report(path, result, example_of(result, demonstrations), command)
 
 
-def _command(file: Path, columns: str | None, experiment: "Experiment", configuration: str | None) -> str:
-    """What to type to get the same figures."""
-    words = ["probdmp", "evaluate", str(file), *(["--columns", columns] if columns is not None else [])]
+def _given(option: str, value: object) -> list[str]:
+    return [] if value is None else [option, str(value)]
+
+
+def _command(given: Sequence[str], experiment: "Experiment", configuration: str | None) -> str:
+    """What to type to get the same figures; `given` says on which recordings."""
+    words = ["probdmp", "evaluate", *given]
     for name in ("train", "test", "seed", "seeds", "detector", "task"):
         words += [f"--{name}", str(getattr(experiment, name))]
     words += ["--fault", ",".join(experiment.faults)]
     if experiment.detector == "calibrated":
         words += ["--false-alarm-rate", f"{experiment.false_alarm_rate:g}"]
-    return join([*words, *(["--configuration", configuration] if configuration is not None else [])])
+    return join([*words, *_given("--configuration", configuration)])
 
 
 def _faults(text: str) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from shlex import join
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -16,6 +17,7 @@ from probdmp.cli.summaries import name_text
 from probdmp.errors import ModelFileError
 
 if TYPE_CHECKING:
+    from probdmp.demonstrations import Demonstration
     from probdmp.detection import FailureDetector, Verdict
     from probdmp.estimator import PrimitiveLibrary
 
@@ -24,8 +26,11 @@ __all__ = ["monitor"]
 
 def monitor(
     model: ModelFile,
-    execution: Annotated[
-        str, typer.Argument(metavar="EXECUTION|-", help="Recorded executions (.npz), or - for JSON lines.", show_default=False)
+    executions: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="EXECUTION…|-", help="Recorded executions (.npz, .csv), or - for JSON lines.", show_default=False
+        ),
     ],
     label: Label = None,
     start: Start = None,
@@ -34,7 +39,10 @@ def monitor(
     start_velocity: StartVelocity = None,
     dt: Annotated[
         float | None,
-        typer.Option(metavar="S", help="With JSON lines: seconds between ticks. Default: as learned."),
+        typer.Option(
+            metavar="S",
+            help="Seconds between ticks of JSON lines, by default as learned; or between samples of .csv files without times.",
+        ),
     ] = None,
     on_alarm: Annotated[
         str | None,
@@ -47,7 +55,7 @@ def monitor(
 ) -> None:
     """Judge executions; exit code 4 if one has failed.
 
-    For a file, a verdict on each recording. With - in its place, one execution as it happens: a JSON object per line and
+    For files, a verdict on each recording. With - in their place, one execution as it happens: a JSON object per line and
     tick on standard input, and one on standard output with the state to reach at the next tick.
 
     In: {"position": [1.5, null], "time": 0.01} in data units and seconds. null: not measured; time may be left out.
@@ -67,25 +75,31 @@ def monitor(
         hint = "Learn it with probdmp fit, which saves one, or give save() a fitted FailureDetector."
         raise ModelFileError(f"a failure detector in {str(model)!r}", "a model without one", hint)
     task = TaskOptions(start, goal, duration, start_velocity)
-    if execution == "-":
+    if "-" in executions:
+        if len(executions) > 1:
+            raise UsageError("- alone, for JSON lines on standard input", join(executions), "Judge files in another call.")
         with usage():
             dt = None if dt is None else check_seconds(dt, "--dt")
             on_alarm = check_choice(on_alarm or "continue", "--on-alarm", ALARM_REACTIONS)
         failed = monitor_stream(library, detector, StreamOptions(label, task, dt, on_alarm))
-    elif dt is not None or on_alarm is not None:
-        raise UsageError("--dt and --on-alarm with JSON lines only", f"them with {execution!r}", "A file has its own dt.")
+    elif on_alarm is not None:
+        raise UsageError("--on-alarm with JSON lines only", f"it with {join(executions)}", "What is recorded cannot be held.")
     else:
-        failed = _monitor_file(Path(execution), library, detector, label, task, as_json)
+        recordings = read_executions([*map(Path, executions)], library, label, dt)
+        failed = _monitor_recordings(recordings, library, detector, task, as_json)
     raise typer.Exit(FAILURE_DETECTED if failed else 0)
 
 
-def _monitor_file(
-    path: Path, library: "PrimitiveLibrary", detector: "FailureDetector", label: str | None, task: TaskOptions, as_json: bool
+def _monitor_recordings(
+    recordings: Sequence["Demonstration"],
+    library: "PrimitiveLibrary",
+    detector: "FailureDetector",
+    task: TaskOptions,
+    as_json: bool,
 ) -> bool:
-    """Judge the recordings of a file and print the verdicts; whether any failed."""
+    """Judge recordings and print the verdicts; whether any failed."""
     from probdmp.dmp import task_for
 
-    recordings = read_executions(path, library, label)
     asked, facts = [], []
     for recording in recordings:
         primitive = primitive_of(library, recording)[1].primitive_

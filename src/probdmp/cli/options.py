@@ -22,6 +22,9 @@ __all__ = [
     "Label",
     "ModelFile",
     "OutputArrays",
+    "OutputRecordings",
+    "RecordingFiles",
+    "SampleStep",
     "Seed",
     "Start",
     "StartVelocity",
@@ -34,16 +37,23 @@ POINT = "X,Y,…"
 
 ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="Model file made by probdmp fit.", show_default=False)]
 ExecutionFile = Annotated[
-    Path, typer.Argument(metavar="EXECUTION", help="Recorded executions, a demonstrations file (.npz).", show_default=False)
+    Path, typer.Argument(metavar="EXECUTION", help="Recorded executions (.npz, .csv).", show_default=False)
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document, missing numbers as null.")]
 Label = Annotated[
     str | None, typer.Option("--label", metavar="LABEL", help="Which primitive, and the recordings with its label.")
 ]
 Index = Annotated[int, typer.Option("--index", min=0, metavar="I", help="Which recording, from 0; with --label, of those.")]
+RecordingFiles = Annotated[list[Path], typer.Argument(metavar="FILE…", help="Recordings (.npz, .csv).", show_default=False)]
 Columns = Annotated[
     str | None,
     typer.Option("--columns", metavar="NAMES", help="Columns that are positions, such as x,y. Default: x, y, z and q…."),
+]
+SampleStep = Annotated[
+    float | None,
+    typer.Option(
+        "--dt", metavar="S", help="Of .csv: seconds between samples, for files without times; others are resampled to it."
+    ),
 ]
 Seed = Annotated[int, typer.Option("--seed", min=0, metavar="N", help="Decides all that is random.")]
 
@@ -62,6 +72,10 @@ StartVelocity = Annotated[
 OutputArrays = Annotated[
     Path | None,
     typer.Option("--output", "-o", metavar="FILE.npz", help="Write times, means and stds as arrays (T, D) to this file."),
+]
+
+OutputRecordings = Annotated[
+    Path, typer.Option("--output", "-o", metavar="FILE", help="Recordings to write (.npz, .csv).", show_default=False)
 ]
 
 
@@ -100,7 +114,7 @@ def names_of(text: str | None) -> Sequence[str] | None:
     return None if text is None else [name.strip() for name in text.split(",")]
 
 
-def check_output(path: Path | None, suffix: str) -> None:
+def check_output(path: Path | None, *suffixes: str) -> None:
     """Refuse a place that cannot be written before the work is done, not after.
 
     Raises
@@ -110,8 +124,8 @@ def check_output(path: Path | None, suffix: str) -> None:
     """
     if path is None:
         return
-    if path.suffix != suffix:
-        raise UsageError(f"an output file that ends in {suffix}", repr(str(path)))
+    if path.suffix not in suffixes:
+        raise UsageError(f"an output file that ends in {' or '.join(suffixes)}", repr(str(path)))
     if not path.parent.is_dir():
         raise UsageError("an output file in a folder that exists", repr(str(path)), f"Make it first: mkdir -p {path.parent}")
 

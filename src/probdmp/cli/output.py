@@ -42,13 +42,16 @@ def print_line(text: str = "", style: str = "") -> None:
     _console().print(printable(text), style=style or None, soft_wrap=not sys.stdout.isatty())
 
 
-def print_table(columns: Sequence[str], rows: Iterable[Sequence[str]], title: str = "", second_lines: str = "") -> None:
+def print_table(
+    columns: Sequence[str], rows: Iterable[Sequence[str]], title: str = "", second_lines: str = "", left: bool = False
+) -> None:
     """A table: the first column to the left, the others, which are numbers, to the right.
 
     Parameters
     ----------
     rows : one text per column.
     second_lines : style of all but the first line of a cell.
+    left : whether the others are texts, and to the left as well; without titles, they get no heading.
     """
     from rich import box
     from rich.table import Table
@@ -61,9 +64,10 @@ def print_table(columns: Sequence[str], rows: Iterable[Sequence[str]], title: st
         padding=(0, 1, 0, 0),
         pad_edge=False,
         title_style="bold",
+        show_header=any(columns),
     )
     for i, column in enumerate(columns):
-        table.add_column(Text(printable(column)), justify="right" if i else "left", vertical="top")
+        table.add_column(Text(printable(column)), justify="right" if i and not left else "left", vertical="top")
     for row in rows:
         heads_and_rests = [printable(cell).partition("\n") for cell in row]
         table.add_row(*(Text.assemble(head, (line_end + rest, second_lines)) for head, line_end, rest in heads_and_rests))

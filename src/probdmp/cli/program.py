@@ -13,19 +13,22 @@ import typer
 from typer.core import TyperGroup
 
 from probdmp import __version__
+from probdmp.cli.convert import convert
 from probdmp.cli.demo import demo
 from probdmp.cli.evaluate import evaluate
 from probdmp.cli.exit_codes import exit_code, message, stop_writing
 from probdmp.cli.fit import fit
 from probdmp.cli.inspect import inspect
 from probdmp.cli.monitor import monitor
+from probdmp.cli.perturb import perturb
 from probdmp.cli.rollout import rollout
 from probdmp.cli.smooth import smooth
 from probdmp.cli.track import track
+from probdmp.cli.verb import Verb
 
 __all__ = ["app", "main"]
 
-VERBS = (demo, fit, inspect, rollout, track, smooth, monitor, evaluate)
+VERBS = (demo, fit, inspect, rollout, track, smooth, monitor, evaluate, perturb, convert)
 
 EPILOG = (
     "Exit codes: 0 fine, 1 error, 2 usage, 3 bad input data or model file, 4 a failure was detected (monitor), 130 interrupted."
@@ -70,7 +73,6 @@ app = typer.Typer(
     cls=Program,
     no_args_is_help=True,
     rich_markup_mode=None,
-    add_completion=False,
     epilog=EPILOG,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
@@ -101,7 +103,7 @@ def _paragraphs(docstring: str | None) -> str:
 
 
 for verb in VERBS:
-    app.command(help=_paragraphs(verb.__doc__))(verb)
+    app.command(cls=Verb, help=_paragraphs(verb.__doc__))(verb)
 
 
 def main() -> None:
