@@ -123,10 +123,11 @@ def evaluation_of(
 ) -> "Evaluation":
     """Run an experiment with a progress bar; the judges are those of its detector unless given."""
     from probdmp.evaluation import DETECTORS, evaluate
+    from probdmp.evaluation.judges import STAGES
 
     chosen = DETECTORS[experiment.detector] if judges is None else judges
     n_classes = len({demonstration.label for demonstration in demonstrations})
-    with progress("Evaluating", n_classes * experiment.seeds * len(chosen)) as done:
+    with progress("Evaluating", n_classes * experiment.seeds * sum(STAGES.get(name, 1) for name in chosen)) as done:
         return evaluate(demonstrations, experiment, chosen, on_class=done)
 
 
