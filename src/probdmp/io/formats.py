@@ -70,5 +70,6 @@ def write_demonstrations(path: str | os.PathLike[str], demonstrations: Sequence[
 def _format(path: str | os.PathLike[str]) -> Format:
     suffix = PurePath(path).suffix.lower()
     if suffix not in FORMATS:
-        raise InputError(f"a file name that ends in {' or '.join(FORMATS)}", repr(os.fspath(path)))
+        hint = "Other programs, spreadsheets too, can save their tables as .csv."
+        raise InputError(f"a file name that ends in {' or '.join(FORMATS)}", repr(os.fspath(path)), hint)
     return FORMATS[suffix]
