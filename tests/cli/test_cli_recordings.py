@@ -43,8 +43,9 @@ def test_a_csv_file_is_as_good_as_an_npz_file(folder, run_json, tmp_path, letter
     for verb in ("track", "smooth"):
         by_csv = run_json(verb, model, tmp_path / "letters.csv", "--index", 3)
         assert by_csv == run_json(verb, model, folder / "letters.npz", "--index", 3)
-    by_csv = run_json("monitor", model, tmp_path / "letters.csv")
-    assert by_csv == run_json("monitor", model, folder / "letters.npz")
+    by_csv, by_npz = (run_json("monitor", model, f) for f in (tmp_path / "letters.csv", folder / "letters.npz"))
+    assert [e.pop("file") for e in by_csv["executions"] + by_npz["executions"]]
+    assert by_csv == by_npz
     arguments = ("--train", 3, "--test", 2, "--detector", "paper")
     assert run_json("evaluate", tmp_path / "letters.csv", *arguments) == run_json(
         "evaluate", folder / "letters.npz", *arguments
@@ -66,7 +67,12 @@ def test_files_name_what_has_no_label(folder, run_json, tmp_path, single_files):
 def test_executions_are_of_the_primitive_that_their_file_is_named_after(folder, run, run_json, single_files):
     files = single_files / "c_1.csv", single_files / "l_1.csv"
     document = run_json("monitor", folder / "letters.probdmp", *files)
-    assert [e["label"] for e in document["executions"]] == ["c", "l"]
+    assert [(e["file"], e["label"], e["index"]) for e in document["executions"]] == [
+        (str(files[0]), "c", 0),
+        (str(files[1]), "l", 0),
+    ]
+    shown = run("monitor", folder / "letters.probdmp", *files).stdout.splitlines()
+    assert [line.partition("  ")[0] for line in shown[:2]] == [f"{files[0]} c 0", f"{files[1]} l 0"]
     (only,) = run_json("monitor", folder / "letters.probdmp", files[0], "--label", "l", exit_code=4)["executions"]
     assert only["label"] == "l"
     assert run_json("track", folder / "letters.probdmp", files[1])["label"] == "l"

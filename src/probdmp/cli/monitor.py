@@ -1,5 +1,6 @@
 """`probdmp monitor`: is an execution still the movement that was taught?"""
 
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from shlex import join
@@ -91,7 +92,7 @@ def monitor(
 
 
 def _monitor_recordings(
-    recordings: Sequence["Demonstration"],
+    found: Sequence[tuple[Path, "Demonstration"]],
     library: "PrimitiveLibrary",
     detector: "FailureDetector",
     task: TaskOptions,
@@ -100,6 +101,7 @@ def _monitor_recordings(
     """Judge recordings and print the verdicts; whether any failed."""
     from probdmp.dmp import task_for
 
+    recordings = [recording for _, recording in found]
     asked, facts = [], []
     for recording in recordings:
         primitive = primitive_of(library, recording)[1].primitive_
@@ -107,26 +109,39 @@ def _monitor_recordings(
         given["start"] = recording.positions[0] if given["start"] is None else given["start"]
         asked.append(task_for(primitive, **given))
         facts.append(detector.calibration_for(primitive, asked[-1]))
-    labels = [recording.label for recording in recordings]
     verdicts = detector.verdicts(recordings, tasks=asked)
+    which = _places(found)
     if as_json:
         executions = [
-            {"label": label, "index": index, **verdict_summary(verdict, its)}
-            for index, (label, verdict, its) in enumerate(zip(labels, verdicts, facts, strict=True))
+            {"file": str(path), "label": label, "index": index, **verdict_summary(verdict, its)}
+            for (path, label, index), verdict, its in zip(which, verdicts, facts, strict=True)
         ]
         count = sum(verdict.failed for verdict in verdicts)
         print_json({"executions": executions, "failed": count, "detector": detector_summary(detector)})
     else:
-        _print_verdicts(labels, verdicts)
+        _print_verdicts(which, verdicts)
         for text in {calibration_text(its): None for its in facts if its is not None}:
             print_line(text, style="dim")
     return any(verdict.failed for verdict in verdicts)
 
 
-def _print_verdicts(labels: Sequence[str], verdicts: "Sequence[Verdict]") -> None:
-    """One line for each, the failed ones in red, and a count."""
-    width, digits = max(map(len, map(name_text, labels))), len(str(len(labels) - 1))
-    for index, (label, verdict) in enumerate(zip(labels, verdicts, strict=True)):
-        print_line(f"{name_text(label):<{width}} {index:>{digits}}  {verdict}", style="red" if verdict.failed else "")
+def _places(found: Sequence[tuple[Path, "Demonstration"]]) -> list[tuple[Path, str, int]]:
+    """File, label, and place among those of the file, from 0, of each recording."""
+    seen: Counter[Path] = Counter()
+    places = []
+    for path, recording in found:
+        places.append((path, recording.label, seen[path]))
+        seen[path] += 1
+    return places
+
+
+def _print_verdicts(which: Sequence[tuple[Path, str, int]], verdicts: "Sequence[Verdict]") -> None:
+    """One line for each, with its file if there are several, the failed ones in red, and a count."""
+    several = len({path for path, _, _ in which}) > 1
+    rows = [[*([str(path)] if several else []), name_text(label), str(index)] for path, label, index in which]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row, verdict in zip(rows, verdicts, strict=True):
+        *texts, index = (f"{text:<{width}}" for text, width in zip(row, widths, strict=True))
+        print_line(f"{' '.join(texts)} {index.strip():>{widths[-1]}}  {verdict}", style="red" if verdict.failed else "")
     n_failed = sum(verdict.failed for verdict in verdicts)
     print_line(f"{n_failed} of {len(verdicts)} executions failed.", style="bold")

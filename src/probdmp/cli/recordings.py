@@ -34,14 +34,14 @@ def read_files(
     with nullcontext() if columns is None and dt is None else usage():
         found = _read(paths, columns, dt)
     if label is not None:
-        return _labelled(found, label)
-    return [replace(d, label=name) if len(paths) > 1 and not d.label else d for name, d in found]
+        return [d for _, d in _labelled(found, label)]
+    return [replace(d, label=label_of_file(path)) if len(paths) > 1 and not d.label else d for path, d in found]
 
 
 def read_executions(
     paths: Sequence[Path], library: "PrimitiveLibrary", label: str | None, dt: float | None = None
-) -> list["Demonstration"]:
-    """Recorded executions of the primitives of a library: all, or those with a label.
+) -> list[tuple[Path, "Demonstration"]]:
+    """Recorded executions of the primitives of a library, with the files they are from: all, or those with a label.
 
     Recordings without a label are executions of whatever primitive is asked for, and get its label; unless one is, of the
     primitive that their file is named after, if there is one.
@@ -50,11 +50,9 @@ def read_executions(
     primitive = first.primitive_
     with nullcontext() if dt is None else usage():
         found = _read(paths, primitive.names, dt)
-    if label is not None:
-        chosen = _labelled(found, label)
-    else:
-        chosen = [replace(d, label=name) if not d.label and name in library else d for name, d in found]
-    units = next((d.units for d in chosen if d.units != primitive.units), "")
+    named = [(path, _named_by(path, d, library)) for path, d in found] if label is None else []
+    chosen = named if label is None else _labelled(found, label)
+    units = next((d.units for _, d in chosen if d.units != primitive.units), "")
     if units and primitive.units:
         place = " and ".join(repr(str(path)) for path in paths)
         raise DataFileError(f"positions in {primitive.units}, as learned, in {place}", units, "Convert them first.")
@@ -68,7 +66,8 @@ def read_recording(
     chosen = read_executions([path], library, label, dt)
     if index >= len(chosen):
         raise UsageError(f"--index from 0 to {len(chosen) - 1}", str(index), f"There are {len(chosen)} such recordings.")
-    return *primitive_of(library, chosen[index]), chosen[index]
+    recording = chosen[index][1]
+    return *primitive_of(library, recording), recording
 
 
 def primitive_of(library: "PrimitiveLibrary", recording: "Demonstration") -> tuple[str, "ProbabilisticDMP"]:
@@ -97,24 +96,35 @@ def label_of_file(path: Path) -> str:
     return re.sub(r"[\s_.-]*(\d+|\(\d+\))?$", "", path.stem)
 
 
-def _read(paths: Sequence[Path], columns: Sequence[str] | None, dt: float | None) -> list[tuple[str, "Demonstration"]]:
-    """Every recording with what its file is named after; what had to be done to its samples is said on standard error."""
+def _named_by(path: Path, recording: "Demonstration", library: "PrimitiveLibrary") -> "Demonstration":
+    """A recording without a label with that of its file, if it is one of the library."""
+    name = label_of_file(path)
+    return replace(recording, label=name) if not recording.label and name in library else recording
+
+
+def _read(paths: Sequence[Path], columns: Sequence[str] | None, dt: float | None) -> list[tuple[Path, "Demonstration"]]:
+    """Every recording with its file; what had to be done to its samples is said on standard error."""
     from probdmp.io import read_demonstrations
 
-    found: list[tuple[str, Demonstration]] = []
+    found: list[tuple[Path, Demonstration]] = []
     for path in paths:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", RecordingWarning)
-            found += [(label_of_file(path), d) for d in read_demonstrations(path, columns=columns, dt=dt)]
+            found += [(path, d) for d in read_demonstrations(path, columns=columns, dt=dt)]
         for warning in caught:
             print(f"probdmp: {warning.message}", file=sys.stderr)
     return found
 
 
-def _labelled(found: Sequence[tuple[str, "Demonstration"]], label: str) -> list["Demonstration"]:
+def _labelled(found: Sequence[tuple[Path, "Demonstration"]], label: str) -> list[tuple[Path, "Demonstration"]]:
     """Those with the label; those without any count if their files are named after it, or if no file is."""
-    named = any(name == label and not d.label for name, d in found)
-    chosen = [replace(d, label=label) for name, d in found if d.label == label or not (d.label or (named and name != label))]
+    names = [d.label or label_of_file(path) for path, d in found]
+    by_file = any(name == label and not d.label for name, (_, d) in zip(names, found, strict=True))
+    chosen = [
+        (path, replace(d, label=label))
+        for name, (path, d) in zip(names, found, strict=True)
+        if name == label or not (d.label or by_file)
+    ]
     if not chosen:
         present = ", ".join(map(repr, sorted({d.label for _, d in found})))
         raise UsageError(f"--label to be one of those in the file: {present}", repr(label))

@@ -51,7 +51,7 @@ def print_system(summary: dict[str, Any]) -> None:
     where = "not set: real recordings are for the tests alone" if summary["recordings"] is None else summary["recordings"]
     lost = summary["recordings"] is not None and not summary["recordings_found"]
     rows.append([RECORDINGS, where + (", which is no folder" if lost else "")])
-    print_table(["", ""], rows, left=True)
+    print_table(["", ""], rows)
 
 
 def _version(name: str) -> str | None:
