@@ -57,27 +57,11 @@ def perturb(
     with usage():
         write_demonstrations(output, [faulty[k] for k in sorted(faulty)])
     executions = [_execution(k, recordings[k], faulty[k], onsets[k]) for k in sorted(faulty)]
+    document = {"fault": chosen.name, "nature": chosen.nature, "seed": seed, "output": str(output), "executions": executions}
     if as_json:
-        print_json(
-            {"fault": chosen.name, "nature": chosen.nature, "seed": seed, "output": str(output), "executions": executions}
-        )
-        return
-    print_line(f"Fault {chosen.name} ({chosen.nature}), seed {seed}", style="bold")
-    print_table(
-        ["execution", "label", "onset\n[s]", "onset\n[% of duration]", "duration before\n[s]", "with the fault\n[s]"],
-        [
-            [
-                f"{e['index']}",
-                name_text(e["label"]),
-                f"{e['onset_time']:.3f}",
-                f"{100 * e['onset']:.1f}",
-                f"{e['duration_before']:.3f}",
-                f"{e['duration']:.3f}",
-            ]
-            for e in executions
-        ],
-    )
-    print_line(f"Wrote {len(executions)} executions to {output}.")
+        print_json(document)
+    else:
+        _print_document(document)
 
 
 def _perturbed(
@@ -112,3 +96,22 @@ def _execution(index: int, before: "Demonstration", faulty: "Demonstration", ons
         "duration_before": before.duration,
         "duration": faulty.duration,
     }
+
+
+def _print_document(document: dict[str, Any]) -> None:
+    print_line(f"Fault {document['fault']} ({document['nature']}), seed {document['seed']}", style="bold")
+    print_table(
+        ["execution", "label", "onset\n[s]", "onset\n[% of duration]", "duration before\n[s]", "with the fault\n[s]"],
+        [
+            [
+                f"{e['index']}",
+                name_text(e["label"]),
+                f"{e['onset_time']:.3f}",
+                f"{100 * e['onset']:.1f}",
+                f"{e['duration_before']:.3f}",
+                f"{e['duration']:.3f}",
+            ]
+            for e in document["executions"]
+        ],
+    )
+    print_line(f"Wrote {len(document['executions'])} executions to {document['output']}.")

@@ -50,8 +50,7 @@ def read_executions(
     primitive = first.primitive_
     with nullcontext() if dt is None else usage():
         found = _read(paths, primitive.names, dt)
-    named = [(path, _named_by(path, d, library)) for path, d in found] if label is None else []
-    chosen = named if label is None else _labelled(found, label)
+    chosen = _labelled(found, label) if label is not None else [(path, _named_by(path, d, library)) for path, d in found]
     units = next((d.units for _, d in chosen if d.units != primitive.units), "")
     if units and primitive.units:
         place = " and ".join(repr(str(path)) for path in paths)
