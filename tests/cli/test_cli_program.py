@@ -72,7 +72,7 @@ def test_help_loads_nothing_heavy(verb):
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = result.stderr
     assert "'typer'" in loaded
-    for module in ("numpy", "scipy", "matplotlib", "rich", "asyncio", "probdmp.estimator", "probdmp.io"):
+    for module in ("numpy", "scipy", "matplotlib", "rich", "asyncio", "pydantic", "probdmp.estimator", "probdmp.io"):
         assert f"'{module}'" not in loaded
 
 

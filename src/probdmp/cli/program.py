@@ -34,13 +34,19 @@ EPILOG = (
     "Exit codes: 0 fine, 1 error, 2 usage, 3 bad input data or model file, 4 a failure was detected (monitor), 130 interrupted."
 )
 
+HELP = {"-h", "--help"}
+
 
 class Program(TyperGroup):
     """The verbs as one command, whose errors are one line and an exit code."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Read what stands before the verb."""
+        """Read what stands before the verb; its help is shown unread, since what checks values takes long to load."""
         with _errors_ended() if args else nullcontext():
+            if args and args[0] in self.commands and not HELP.isdisjoint(args):
+                verb = self.commands[args[0]]
+                print(verb.get_help(verb.context_class(verb, info_name=args[0], parent=ctx)))
+                raise typer.Exit
             return super().parse_args(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:
@@ -74,7 +80,7 @@ app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
     epilog=EPILOG,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings={"help_option_names": sorted(HELP)},
 )
 
 
