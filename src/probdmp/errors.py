@@ -10,7 +10,8 @@
     ├── ModelFileError (ValueError)      a model file that is damaged, hostile or not what it claims
     └── MissingExtraError (ImportError)  an optional dependency is not installed
 
-Each says what was expected, what came, and what to do; the three parts are kept as attributes.
+Each says what was expected, what came, and what to do; the three parts are kept as attributes. And one warning,
+`RecordingWarning` (UserWarning): a recording is used, but not as it stands in its file.
 """
 
 from typing import Any
@@ -23,6 +24,7 @@ __all__ = [
     "ModelFileError",
     "NotFittedError",
     "ProbDMPError",
+    "RecordingWarning",
     "TooFewDemonstrationsError",
     "UnknownLabelError",
 ]
@@ -81,3 +83,7 @@ class ModelFileError(ProbDMPError, ValueError):
 
 class MissingExtraError(ProbDMPError, ImportError):
     """An optional dependency is not installed."""
+
+
+class RecordingWarning(UserWarning):
+    """A recording is used, but not as it stands in its file: resampled, or with rows put in."""

@@ -217,7 +217,7 @@ def test_options_that_do_not_fit_the_model_are_usage_errors(arguments, folder, r
     assert run("monitor", folder / "letters.probdmp", *arguments, text=GOOD).exit_code == 2
 
 
-@pytest.mark.parametrize("option", [("--dt", "0.1"), ("--on-alarm", "hold")])
+@pytest.mark.parametrize("option", [("--dt", "0.1"), ("--on-alarm", "hold"), ("-",)])
 def test_options_for_json_lines_are_refused_with_a_file(option, folder, run):
     assert run("monitor", folder / "letters.probdmp", folder / "letters.npz", *option).exit_code == 2
 

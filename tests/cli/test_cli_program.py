@@ -3,6 +3,7 @@
 import json
 import os
 import pty
+import re
 import signal
 import subprocess
 import sys
@@ -62,13 +63,37 @@ def test_first_lines_of_help_are_not_cut_off(run):
         assert code in shown
 
 
-def test_help_loads_nothing_heavy():
-    code = "import sys; from probdmp.cli import app\ntry: app(['--help'])\nfinally: print(sorted(sys.modules), file=sys.stderr)"
+@pytest.mark.parametrize("verb", [None, *(verb.__name__ for verb in VERBS)])
+def test_help_loads_nothing_heavy(verb):
+    arguments = [*([verb] if verb else []), "--help"]
+    code = (
+        f"import sys; from probdmp.cli import app\ntry: app({arguments})\nfinally: print(sorted(sys.modules), file=sys.stderr)"
+    )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = result.stderr
     assert "'typer'" in loaded
-    for module in ("numpy", "scipy", "matplotlib", "rich", "probdmp.estimator"):
+    for module in ("numpy", "scipy", "matplotlib", "rich", "asyncio", "pydantic", "probdmp.estimator", "probdmp.io"):
         assert f"'{module}'" not in loaded
+
+
+def test_arguments_are_shown_as_they_are_called(run):
+    assert run("monitor", "--help").stdout.startswith("Usage: probdmp monitor [OPTIONS] MODEL EXECUTION…|-\n")
+    assert run("convert", "--help").stdout.startswith("Usage: probdmp convert [OPTIONS] IN… OUT\n")
+    shown = run("inspect", "--help").stdout
+    assert shown.startswith("Usage: probdmp inspect [OPTIONS] [MODEL]\n")
+    assert "list[" not in shown + run("fit", "--help").stdout
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_the_shell_can_complete(shell):
+    asked = environment(_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION="1")
+    arguments = [*PROGRAM, "--show-completion", shell]
+    script = subprocess.run(arguments, env=asked, capture_output=True, text=True, check=True)
+    assert "_PROBDMP_COMPLETE" in script.stdout
+    if shell == "bash":
+        for words, found in (("probdmp per", "perturb"), ("probdmp fit --pub", "--published")):
+            asked = environment(COMP_WORDS=words, COMP_CWORD=str(words.count(" ")), _PROBDMP_COMPLETE="complete_bash")
+            assert subprocess.run(PROGRAM, env=asked, capture_output=True, text=True, check=True).stdout.split() == [found]
 
 
 def test_version(run):
@@ -117,6 +142,42 @@ def test_errors_are_one_line_and_an_exit_code(arguments, code, folder, run, monk
     assert result.stderr.startswith("probdmp: ")
     assert result.stderr.count("\n") == 1
     assert not (folder / "m.probdmp").exists()
+
+
+RECORDINGS = {
+    "none.npz": "no such file",
+    "none.csv": "no such file",
+    "folder.csv": "a directory",
+    "empty.npz": "or a part of one",
+    "empty.csv": "an empty file",
+    "table.xlsx": r"'.*table.xlsx'. Other programs",
+    "secret.csv": "permission denied",
+}
+READERS = {
+    "fit": ["{}", "-o", "m.probdmp"],
+    "track": ["c.probdmp", "{}"],
+    "smooth": ["c.probdmp", "{}"],
+    "monitor": ["c.probdmp", "{}"],
+    "evaluate": ["{}"],
+    "perturb": ["{}", "-o", "m.csv"],
+    "convert": ["{}", "m.csv"],
+}
+
+
+@pytest.mark.parametrize("name", RECORDINGS)
+@pytest.mark.parametrize("verb", READERS)
+def test_recordings_that_cannot_be_read(verb, name, folder, run, monkeypatch, tmp_path):
+    monkeypatch.chdir(folder)
+    if name == "secret.csv" and os.geteuid() == 0:
+        pytest.skip("root may read everything")
+    (tmp_path / "folder.csv").mkdir()
+    for empty in ("empty.npz", "empty.csv", "table.xlsx", "secret.csv"):
+        (tmp_path / empty).touch()
+    (tmp_path / "secret.csv").chmod(0)
+    result = run(verb, *(str(tmp_path / name) if a == "{}" else a for a in READERS[verb]))
+    assert (result.exit_code, result.stdout) == (3, "")
+    assert re.fullmatch(rf"probdmp: expected .*{RECORDINGS[name]}.*\. .*\.?\n|probdmp: .*{RECORDINGS[name]}.*\n", result.stderr)
+    assert not (folder / "m.csv").exists()
 
 
 @pytest.mark.parametrize(
@@ -199,6 +260,47 @@ def test_pipes_get_neither_color_nor_progress(folder):
 def test_progress_shows_in_a_terminal(folder):
     shown = in_terminal(["fit", folder / "letters.npz", "-o", folder / "again.probdmp", "--n-basis", "5"])
     assert "Learning" in shown
+    assert re.search(r"Calibrating .*[1-9]/4.* elapsed, .* left", shown)  # two primitives, with and without their goals
+
+
+@pytest.mark.parametrize("width", [80, 120])
+@pytest.mark.parametrize(
+    "words", ["inspect letters.probdmp", "rollout c.probdmp", "monitor c.probdmp unlabelled.npz", "inspect --system"]
+)
+def test_terminals_are_wide_enough(words, width, folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    shown = in_terminal(words.split(), COLUMNS=str(width), NO_COLOR="1")
+    assert max(map(len, shown.replace("\r\n", "\n").splitlines())) <= width
+    assert "…" not in shown
+
+
+def test_interrupted_work_says_so_and_writes_nothing(folder, tmp_path):
+    model = tmp_path / "m.probdmp"
+    leader, follower = pty.openpty()
+    arguments = [*PROGRAM, "fit", folder / "letters.npz", "-o", model, "--n-basis", "60"]
+    with subprocess.Popen(arguments, stderr=follower, stdout=subprocess.DEVNULL, env=environment()) as process:
+        os.close(follower)
+        shown = b""
+        while b"Learning" not in shown:
+            shown += os.read(leader, 65536)
+        process.send_signal(signal.SIGINT)
+        try:
+            while chunk := os.read(leader, 65536):
+                shown += chunk
+        except OSError:  # the other end is closed
+            pass
+        os.close(leader)
+    assert process.returncode == 130
+    assert b"Traceback" not in shown
+    assert shown.endswith(b"probdmp: interrupted\r\n")
+    assert not model.exists()
+
+
+def test_an_interrupt_while_loading_is_one_line():
+    code = "import sys\nfrom probdmp.cli import main\nclass Stop:\n def find_spec(self, name, path=None, target=None):\n  "
+    code += "if name == 'typer': raise KeyboardInterrupt\nsys.meta_path.insert(0, Stop())\nmain()"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (result.returncode, result.stderr) == (130, "probdmp: interrupted\n")
 
 
 def test_a_reader_that_leaves_is_no_scandal(folder):

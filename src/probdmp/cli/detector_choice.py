@@ -72,5 +72,5 @@ def calibrate(
     if detector.rule == "calibrated" and scarce:
         hint = "Record more, leave it out with --label, or use --rule paper, which says nothing of false alarms."
         raise TooFewDemonstrationsError("two or more demonstrations of everything", f"one of {', '.join(scarce)}", hint)
-    with progress("Calibrating", None):
-        detector.fit(library, demonstrations)
+    with progress("Calibrating", None) as done:
+        detector.fit(library, demonstrations, on_part=done)

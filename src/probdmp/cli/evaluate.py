@@ -10,7 +10,7 @@ import typer
 from probdmp.cli.detector_choice import DEFAULT_RATE, FalseAlarmRate
 from probdmp.cli.evaluation_table import print_evaluation
 from probdmp.cli.exit_codes import UsageError, usage
-from probdmp.cli.options import Columns, Json, Seed, check_output, names_of
+from probdmp.cli.options import Columns, Json, RecordingFiles, SampleStep, Seed, check_output, names_of
 from probdmp.cli.output import print_json, print_line
 from probdmp.cli.progress import progress
 from probdmp.cli.recordings import read_files
@@ -34,8 +34,9 @@ Test = Annotated[int, typer.Option(metavar="N", help="Other demonstrations per c
 
 
 def evaluate(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="Labelled demonstrations (.npz).", show_default=False)],
+    files: RecordingFiles,
     columns: Columns = None,
+    dt: SampleStep = None,
     train: Train = 10,
     test: Test = 10,
     seed: Seed = 0,
@@ -83,9 +84,10 @@ def evaluate(
         from probdmp.plotting.style import require_matplotlib
 
         require_matplotlib()
-    demonstrations = read_files([file], names_of(columns))
+    demonstrations = read_files(files, names_of(columns), dt=dt)
     result = evaluation_of(demonstrations, experiment)
-    command = _command(file, columns, experiment, configuration)
+    given = [*map(str, files), *_given("--columns", columns), *_given("--dt", dt)]
+    command = _command(given, experiment, configuration)
     if as_json:
         print_json(result.as_dict(command))
     else:
@@ -122,10 +124,11 @@ def evaluation_of(
 ) -> "Evaluation":
     """Run an experiment with a progress bar; the judges are those of its detector unless given."""
     from probdmp.evaluation import DETECTORS, evaluate
+    from probdmp.evaluation.judges import STAGES
 
     chosen = DETECTORS[experiment.detector] if judges is None else judges
     n_classes = len({demonstration.label for demonstration in demonstrations})
-    with progress("Evaluating", n_classes * experiment.seeds * len(chosen)) as done:
+    with progress("Evaluating", n_classes * experiment.seeds * sum(STAGES.get(name, 1) for name in chosen)) as done:
         return evaluate(demonstrations, experiment, chosen, on_class=done)
 
 
@@ -144,15 +147,19 @@ def write_evaluation(path: Path, result: "Evaluation", demonstrations: Sequence[
     write_atomically(path, evaluation_page(result.record(command), example_of(result, demonstrations)).encode())
 
 
-def _command(file: Path, columns: str | None, experiment: "Experiment", configuration: str | None) -> str:
-    """What to type to get the same figures."""
-    words = ["probdmp", "evaluate", str(file), *(["--columns", columns] if columns is not None else [])]
+def _given(option: str, value: object) -> list[str]:
+    return [] if value is None else [option, str(value)]
+
+
+def _command(given: Sequence[str], experiment: "Experiment", configuration: str | None) -> str:
+    """What to type to get the same figures; `given` says on which recordings."""
+    words = ["probdmp", "evaluate", *given]
     for name in ("train", "test", "seed", "seeds", "detector", "task"):
         words += [f"--{name}", str(getattr(experiment, name))]
     words += ["--fault", ",".join(experiment.faults)]
     if experiment.detector == "calibrated":
         words += ["--false-alarm-rate", f"{experiment.false_alarm_rate:g}"]
-    return join([*words, *(["--configuration", configuration] if configuration is not None else [])])
+    return join([*words, *_given("--configuration", configuration)])
 
 
 def _faults(text: str) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from probdmp.cli import INTERRUPTED
 from probdmp.errors import (
     DataFileError,
     InputError,
@@ -21,7 +22,6 @@ ERROR = 1
 USAGE = 2
 BAD_INPUT = 3
 FAILURE_DETECTED = 4
-INTERRUPTED = 130
 
 
 class UsageError(ProbDMPError):

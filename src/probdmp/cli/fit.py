@@ -11,7 +11,7 @@ from probdmp.cli.command_line import command_line
 from probdmp.cli.detector_choice import FalseAlarmRate, Rule, calibrate, chosen_detector
 from probdmp.cli.detector_summaries import calibration_text, detector_summary
 from probdmp.cli.exit_codes import UsageError, usage
-from probdmp.cli.options import Columns, Json, check_output, names_of
+from probdmp.cli.options import Columns, Json, RecordingFiles, SampleStep, check_output, names_of
 from probdmp.cli.output import print_json, print_line, print_table
 from probdmp.cli.progress import progress
 from probdmp.cli.recordings import read_files
@@ -31,15 +31,18 @@ DECIDED = dict.fromkeys(("discretization", "scaling", "weight_model", "weight_un
 
 def fit(
     context: typer.Context,
-    files: Annotated[list[Path], typer.Argument(metavar="FILE…", help="Demonstrations (.npz).", show_default=False)],
+    files: RecordingFiles,
     output: Annotated[
         Path,
         typer.Option(
             "--output", "-o", metavar="MODEL", help="Model file to write, such as letters.probdmp.", show_default=False
         ),
     ],
-    label: Annotated[str | None, typer.Option(metavar="LABEL", help="Learn this movement only.")] = None,
+    label: Annotated[
+        str | None, typer.Option(metavar="LABEL", help="Learn this movement only; recordings without a label are of it.")
+    ] = None,
     columns: Columns = None,
+    dt: SampleStep = None,
     n_basis: Annotated[int, typer.Option(metavar="N", help="Basis functions per degree of freedom.")] = 30,
     weight_model: Annotated[
         str | None,
@@ -94,7 +97,10 @@ def fit(
 ) -> None:
     """Learn primitives and their failure detector from demonstrations.
 
-    One primitive for each label in the files; without labels, or with --label, a single one. The failure detector is
+    One primitive for each label; with --label a single one. In several files without labels, those named alike but for a
+    number are of one movement: a_1.csv, a_2.csv and b_1.csv make the primitives a and b.
+
+    The failure detector is
     calibrated on the same demonstrations, each judged by what the others teach, and saved with the primitives, so that probdmp
     monitor can judge executions.
     """
@@ -106,7 +112,7 @@ def fit(
     from probdmp.estimator import PrimitiveLibrary
     from probdmp.evaluation import group_by_label
 
-    demonstrations = group_by_label(read_files(files, names_of(columns), label))
+    demonstrations = group_by_label(read_files(files, names_of(columns), label, dt))
     library = PrimitiveLibrary(_learn(demonstrations, settings))
     calibrate(detector, library, demonstrations)
     with usage():

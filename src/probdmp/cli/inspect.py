@@ -1,12 +1,16 @@
 """`probdmp inspect`: what a model file holds."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
 
 from probdmp.cli.detector_summaries import detector_summary, print_detector
-from probdmp.cli.options import Json, ModelFile
+from probdmp.cli.exit_codes import UsageError
+from probdmp.cli.options import Json
 from probdmp.cli.output import print_json, print_line, print_table
 from probdmp.cli.summaries import by_name, common_units, name_text, primitive_summary
+from probdmp.cli.system import print_system, system_summary
 from probdmp.cli.trajectories import with_unit
 
 if TYPE_CHECKING:
@@ -16,13 +20,27 @@ if TYPE_CHECKING:
 __all__ = ["inspect"]
 
 
-def inspect(model: ModelFile, as_json: Json = False) -> None:
-    """Show what a model file holds.
+def inspect(
+    model: Annotated[
+        Path | None, typer.Argument(metavar="MODEL", help="Model file made by probdmp fit.", show_default=False)
+    ] = None,
+    system: Annotated[
+        bool, typer.Option("--system", help="Show versions and what else a report of a problem should say, instead.")
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """Show what a model file holds; or the system, with --system.
 
     Its primitives with their configuration and sensor noise, the failure detector, and where all this comes from.
 
     The file is checked first: that its digest, a SHA-256, belongs to its content. A damaged file gives exit code 3.
     """
+    if system == (model is not None):
+        raise UsageError("either a MODEL or --system", "both" if system else "neither", "Try: probdmp inspect --help")
+    if model is None:
+        summary = system_summary()
+        print_json(summary) if as_json else print_system(summary)
+        return
     from probdmp.detection import FailureDetector
     from probdmp.io import read_model
 

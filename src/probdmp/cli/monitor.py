@@ -1,7 +1,9 @@
 """`probdmp monitor`: is an execution still the movement that was taught?"""
 
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
+from shlex import join
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -16,6 +18,7 @@ from probdmp.cli.summaries import name_text
 from probdmp.errors import ModelFileError
 
 if TYPE_CHECKING:
+    from probdmp.demonstrations import Demonstration
     from probdmp.detection import FailureDetector, Verdict
     from probdmp.estimator import PrimitiveLibrary
 
@@ -24,8 +27,11 @@ __all__ = ["monitor"]
 
 def monitor(
     model: ModelFile,
-    execution: Annotated[
-        str, typer.Argument(metavar="EXECUTION|-", help="Recorded executions (.npz), or - for JSON lines.", show_default=False)
+    executions: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="EXECUTION…|-", help="Recorded executions (.npz, .csv), or - for JSON lines.", show_default=False
+        ),
     ],
     label: Label = None,
     start: Start = None,
@@ -34,7 +40,10 @@ def monitor(
     start_velocity: StartVelocity = None,
     dt: Annotated[
         float | None,
-        typer.Option(metavar="S", help="With JSON lines: seconds between ticks. Default: as learned."),
+        typer.Option(
+            metavar="S",
+            help="Seconds between ticks of JSON lines, by default as learned; or between samples of .csv files without times.",
+        ),
     ] = None,
     on_alarm: Annotated[
         str | None,
@@ -47,7 +56,7 @@ def monitor(
 ) -> None:
     """Judge executions; exit code 4 if one has failed.
 
-    For a file, a verdict on each recording. With - in its place, one execution as it happens: a JSON object per line and
+    For files, a verdict on each recording. With - in their place, one execution as it happens: a JSON object per line and
     tick on standard input, and one on standard output with the state to reach at the next tick.
 
     In: {"position": [1.5, null], "time": 0.01} in data units and seconds. null: not measured; time may be left out.
@@ -67,25 +76,32 @@ def monitor(
         hint = "Learn it with probdmp fit, which saves one, or give save() a fitted FailureDetector."
         raise ModelFileError(f"a failure detector in {str(model)!r}", "a model without one", hint)
     task = TaskOptions(start, goal, duration, start_velocity)
-    if execution == "-":
+    if "-" in executions:
+        if len(executions) > 1:
+            raise UsageError("- alone, for JSON lines on standard input", join(executions), "Judge files in another call.")
         with usage():
             dt = None if dt is None else check_seconds(dt, "--dt")
             on_alarm = check_choice(on_alarm or "continue", "--on-alarm", ALARM_REACTIONS)
         failed = monitor_stream(library, detector, StreamOptions(label, task, dt, on_alarm))
-    elif dt is not None or on_alarm is not None:
-        raise UsageError("--dt and --on-alarm with JSON lines only", f"them with {execution!r}", "A file has its own dt.")
+    elif on_alarm is not None:
+        raise UsageError("--on-alarm with JSON lines only", f"it with {join(executions)}", "What is recorded cannot be held.")
     else:
-        failed = _monitor_file(Path(execution), library, detector, label, task, as_json)
+        recordings = read_executions([*map(Path, executions)], library, label, dt)
+        failed = _monitor_recordings(recordings, library, detector, task, as_json)
     raise typer.Exit(FAILURE_DETECTED if failed else 0)
 
 
-def _monitor_file(
-    path: Path, library: "PrimitiveLibrary", detector: "FailureDetector", label: str | None, task: TaskOptions, as_json: bool
+def _monitor_recordings(
+    found: Sequence[tuple[Path, "Demonstration"]],
+    library: "PrimitiveLibrary",
+    detector: "FailureDetector",
+    task: TaskOptions,
+    as_json: bool,
 ) -> bool:
-    """Judge the recordings of a file and print the verdicts; whether any failed."""
+    """Judge recordings and print the verdicts; whether any failed."""
     from probdmp.dmp import task_for
 
-    recordings = read_executions(path, library, label)
+    recordings = [recording for _, recording in found]
     asked, facts = [], []
     for recording in recordings:
         primitive = primitive_of(library, recording)[1].primitive_
@@ -93,26 +109,39 @@ def _monitor_file(
         given["start"] = recording.positions[0] if given["start"] is None else given["start"]
         asked.append(task_for(primitive, **given))
         facts.append(detector.calibration_for(primitive, asked[-1]))
-    labels = [recording.label for recording in recordings]
     verdicts = detector.verdicts(recordings, tasks=asked)
+    which = _places(found)
     if as_json:
         executions = [
-            {"label": label, "index": index, **verdict_summary(verdict, its)}
-            for index, (label, verdict, its) in enumerate(zip(labels, verdicts, facts, strict=True))
+            {"file": str(path), "label": label, "index": index, **verdict_summary(verdict, its)}
+            for (path, label, index), verdict, its in zip(which, verdicts, facts, strict=True)
         ]
         count = sum(verdict.failed for verdict in verdicts)
         print_json({"executions": executions, "failed": count, "detector": detector_summary(detector)})
     else:
-        _print_verdicts(labels, verdicts)
+        _print_verdicts(which, verdicts)
         for text in {calibration_text(its): None for its in facts if its is not None}:
             print_line(text, style="dim")
     return any(verdict.failed for verdict in verdicts)
 
 
-def _print_verdicts(labels: Sequence[str], verdicts: "Sequence[Verdict]") -> None:
-    """One line for each, the failed ones in red, and a count."""
-    width, digits = max(map(len, map(name_text, labels))), len(str(len(labels) - 1))
-    for index, (label, verdict) in enumerate(zip(labels, verdicts, strict=True)):
-        print_line(f"{name_text(label):<{width}} {index:>{digits}}  {verdict}", style="red" if verdict.failed else "")
+def _places(found: Sequence[tuple[Path, "Demonstration"]]) -> list[tuple[Path, str, int]]:
+    """File, label, and place among those of the file, from 0, of each recording."""
+    seen: Counter[Path] = Counter()
+    places = []
+    for path, recording in found:
+        places.append((path, recording.label, seen[path]))
+        seen[path] += 1
+    return places
+
+
+def _print_verdicts(which: Sequence[tuple[Path, str, int]], verdicts: "Sequence[Verdict]") -> None:
+    """One line for each, with its file if there are several, the failed ones in red, and a count."""
+    several = len({path for path, _, _ in which}) > 1
+    rows = [[*([str(path)] if several else []), name_text(label), str(index)] for path, label, index in which]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row, verdict in zip(rows, verdicts, strict=True):
+        *texts, index = (f"{text:<{width}}" for text, width in zip(row, widths, strict=True))
+        print_line(f"{' '.join(texts)} {index.strip():>{widths[-1]}}  {verdict}", style="red" if verdict.failed else "")
     n_failed = sum(verdict.failed for verdict in verdicts)
     print_line(f"{n_failed} of {len(verdicts)} executions failed.", style="bold")

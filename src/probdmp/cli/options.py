@@ -22,6 +22,9 @@ __all__ = [
     "Label",
     "ModelFile",
     "OutputArrays",
+    "OutputRecordings",
+    "RecordingFiles",
+    "SampleStep",
     "Seed",
     "Start",
     "StartVelocity",
@@ -34,16 +37,23 @@ POINT = "X,Y,…"
 
 ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="Model file made by probdmp fit.", show_default=False)]
 ExecutionFile = Annotated[
-    Path, typer.Argument(metavar="EXECUTION", help="Recorded executions, a demonstrations file (.npz).", show_default=False)
+    Path, typer.Argument(metavar="EXECUTION", help="Recorded executions (.npz, .csv).", show_default=False)
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document, missing numbers as null.")]
 Label = Annotated[
     str | None, typer.Option("--label", metavar="LABEL", help="Which primitive, and the recordings with its label.")
 ]
 Index = Annotated[int, typer.Option("--index", min=0, metavar="I", help="Which recording, from 0; with --label, of those.")]
+RecordingFiles = Annotated[list[Path], typer.Argument(metavar="FILE…", help="Recordings (.npz, .csv).", show_default=False)]
 Columns = Annotated[
     str | None,
     typer.Option("--columns", metavar="NAMES", help="Columns that are positions, such as x,y. Default: x, y, z and q…."),
+]
+SampleStep = Annotated[
+    float | None,
+    typer.Option(
+        "--dt", metavar="S", help="Of .csv: seconds between samples, for files without times; others are resampled to it."
+    ),
 ]
 Seed = Annotated[int, typer.Option("--seed", min=0, metavar="N", help="Decides all that is random.")]
 
@@ -62,6 +72,10 @@ StartVelocity = Annotated[
 OutputArrays = Annotated[
     Path | None,
     typer.Option("--output", "-o", metavar="FILE.npz", help="Write times, means and stds as arrays (T, D) to this file."),
+]
+
+OutputRecordings = Annotated[
+    Path, typer.Option("--output", "-o", metavar="FILE", help="Recordings to write (.npz, .csv).", show_default=False)
 ]
 
 

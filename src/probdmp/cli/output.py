@@ -15,6 +15,9 @@ __all__ = ["json_line", "plain", "print_json", "print_line", "print_table", "pri
 PIPE_WIDTH = 160
 """Columns where there is no terminal to ask: wide enough for tables not to be squeezed."""
 
+NUMBER_STARTS = "0123456789-+−±–"
+"""With one of these begins what is a number, or stands for one that is not there."""
+
 
 def plain(value: Any) -> Any:
     """Values that JSON can hold: NumPy's as lists and numbers, NaN and infinities as None."""
@@ -43,10 +46,11 @@ def print_line(text: str = "", style: str = "") -> None:
 
 
 def print_table(columns: Sequence[str], rows: Iterable[Sequence[str]], title: str = "", second_lines: str = "") -> None:
-    """A table: the first column to the left, the others, which are numbers, to the right.
+    """A table: numbers to the right, the first column and other texts to the left.
 
     Parameters
     ----------
+    columns : headings; without any, the table has none.
     rows : one text per column.
     second_lines : style of all but the first line of a cell.
     """
@@ -61,11 +65,14 @@ def print_table(columns: Sequence[str], rows: Iterable[Sequence[str]], title: st
         padding=(0, 1, 0, 0),
         pad_edge=False,
         title_style="bold",
+        show_header=any(columns),
     )
+    cells = [[printable(cell) for cell in row] for row in rows]
     for i, column in enumerate(columns):
-        table.add_column(Text(printable(column)), justify="right" if i else "left", vertical="top")
-    for row in rows:
-        heads_and_rests = [printable(cell).partition("\n") for cell in row]
+        numbers = i > 0 and all(row[i][:1] in NUMBER_STARTS for row in cells)
+        table.add_column(Text(printable(column)), justify="right" if numbers else "left", vertical="top")
+    for row in cells:
+        heads_and_rests = [cell.partition("\n") for cell in row]
         table.add_row(*(Text.assemble(head, (line_end + rest, second_lines)) for head, line_end, rest in heads_and_rests))
     _console().print(table)
 

@@ -13,33 +13,42 @@ import typer
 from typer.core import TyperGroup
 
 from probdmp import __version__
+from probdmp.cli.convert import convert
 from probdmp.cli.demo import demo
 from probdmp.cli.evaluate import evaluate
 from probdmp.cli.exit_codes import exit_code, message, stop_writing
 from probdmp.cli.fit import fit
 from probdmp.cli.inspect import inspect
 from probdmp.cli.monitor import monitor
+from probdmp.cli.perturb import perturb
 from probdmp.cli.plot import plot
 from probdmp.cli.report import report
 from probdmp.cli.rollout import rollout
 from probdmp.cli.smooth import smooth
 from probdmp.cli.track import track
+from probdmp.cli.verb import Verb
 
 __all__ = ["app", "main"]
 
-VERBS = (demo, fit, inspect, rollout, track, smooth, monitor, evaluate, plot, report)
+VERBS = (demo, fit, inspect, rollout, track, smooth, monitor, evaluate, plot, report, perturb, convert)
 
 EPILOG = (
     "Exit codes: 0 fine, 1 error, 2 usage, 3 bad input data or model file, 4 a failure was detected (monitor), 130 interrupted."
 )
+
+HELP = {"-h", "--help"}
 
 
 class Program(TyperGroup):
     """The verbs as one command, whose errors are one line and an exit code."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Read what stands before the verb."""
+        """Read what stands before the verb; its help is shown unread, since what checks values takes long to load."""
         with _errors_ended() if args else nullcontext():
+            if args and args[0] in self.commands and not HELP.isdisjoint(args):
+                verb = self.commands[args[0]]
+                print(verb.get_help(verb.context_class(verb, info_name=args[0], parent=ctx)))
+                raise typer.Exit
             return super().parse_args(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:
@@ -72,9 +81,8 @@ app = typer.Typer(
     cls=Program,
     no_args_is_help=True,
     rich_markup_mode=None,
-    add_completion=False,
     epilog=EPILOG,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings={"help_option_names": sorted(HELP)},
 )
 
 
@@ -103,7 +111,7 @@ def _paragraphs(docstring: str | None) -> str:
 
 
 for verb in VERBS:
-    app.command(help=_paragraphs(verb.__doc__))(verb)
+    app.command(cls=Verb, help=_paragraphs(verb.__doc__))(verb)
 
 
 def main() -> None:

@@ -1,63 +1,72 @@
 """Which recordings and which primitive a command speaks of."""
 
+import re
+import sys
+import warnings
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from probdmp.cli.exit_codes import UsageError, usage
-from probdmp.errors import DataFileError
+from probdmp.errors import DataFileError, RecordingWarning
 
 if TYPE_CHECKING:
     from probdmp.demonstrations import Demonstration
     from probdmp.estimator import PrimitiveLibrary, ProbabilisticDMP
 
-__all__ = ["choose_primitive", "primitive_of", "read_executions", "read_files", "read_recording"]
+__all__ = ["choose_primitive", "label_of_file", "primitive_of", "read_executions", "read_files", "read_recording"]
 
 
-def read_files(paths: Sequence[Path], columns: Sequence[str] | None, label: str | None = None) -> list["Demonstration"]:
+def read_files(
+    paths: Sequence[Path], columns: Sequence[str] | None, label: str | None = None, dt: float | None = None
+) -> list["Demonstration"]:
     """Demonstrations from files, all or those with a label.
+
+    In several files, recordings without a label are named by their file: those of reach_03.csv are labelled reach.
 
     Parameters
     ----------
     columns : names of the columns that are positions; as the files say unless given.
+    dt : seconds between samples, for files without times, or to resample to.
     """
-    from probdmp.io import read_demonstrations
-
-    everything: list[Demonstration] = []
-    for path in paths:
-        if columns is None:
-            everything += read_demonstrations(path)
-        else:
-            with usage():
-                everything += read_demonstrations(path, columns=columns)
-    return _labelled(everything, label)
+    with nullcontext() if columns is None and dt is None else usage():
+        found = _read(paths, columns, dt)
+    if label is not None:
+        return [d for _, d in _labelled(found, label)]
+    return [replace(d, label=label_of_file(path)) if len(paths) > 1 and not d.label else d for path, d in found]
 
 
-def read_executions(path: Path, library: "PrimitiveLibrary", label: str | None) -> list["Demonstration"]:
-    """Recorded executions of the primitives of a library: all, or those with a label.
+def read_executions(
+    paths: Sequence[Path], library: "PrimitiveLibrary", label: str | None, dt: float | None = None
+) -> list[tuple[Path, "Demonstration"]]:
+    """Recorded executions of the primitives of a library, with the files they are from: all, or those with a label.
 
-    Recordings without a label are executions of whatever primitive is asked for, and get its label.
+    Recordings without a label are executions of whatever primitive is asked for, and get its label; unless one is, of the
+    primitive that their file is named after, if there is one.
     """
-    from probdmp.io import read_demonstrations
-
     _, first = choose_primitive(library, label if label is not None else next(iter(library)))
     primitive = first.primitive_
-    chosen = _labelled(read_demonstrations(path, columns=primitive.names), label)
-    units = chosen[0].units
-    if units and primitive.units and units != primitive.units:
-        raise DataFileError(f"positions in {primitive.units}, as learned, in {str(path)!r}", units, "Convert them first.")
+    with nullcontext() if dt is None else usage():
+        found = _read(paths, primitive.names, dt)
+    chosen = _labelled(found, label) if label is not None else [(path, _named_by(path, d, library)) for path, d in found]
+    units = next((d.units for _, d in chosen if d.units != primitive.units), "")
+    if units and primitive.units:
+        place = " and ".join(repr(str(path)) for path in paths)
+        raise DataFileError(f"positions in {primitive.units}, as learned, in {place}", units, "Convert them first.")
     return chosen
 
 
 def read_recording(
-    path: Path, library: "PrimitiveLibrary", label: str | None, index: int
+    path: Path, library: "PrimitiveLibrary", label: str | None, index: int, dt: float | None = None
 ) -> tuple[str, "ProbabilisticDMP", "Demonstration"]:
     """One recorded execution, the primitive it is an execution of, and the label of that."""
-    chosen = read_executions(path, library, label)
+    chosen = read_executions([path], library, label, dt)
     if index >= len(chosen):
         raise UsageError(f"--index from 0 to {len(chosen) - 1}", str(index), f"There are {len(chosen)} such recordings.")
-    return *primitive_of(library, chosen[index]), chosen[index]
+    recording = chosen[index][1]
+    return *primitive_of(library, recording), recording
 
 
 def primitive_of(library: "PrimitiveLibrary", recording: "Demonstration") -> tuple[str, "ProbabilisticDMP"]:
@@ -81,12 +90,41 @@ def choose_primitive(library: "PrimitiveLibrary", label: str | None) -> tuple[st
     return chosen, library[chosen]
 
 
-def _labelled(recordings: list["Demonstration"], label: str | None) -> list["Demonstration"]:
-    """All recordings, or those with the label; those without any count as having it."""
-    if label is None:
-        return recordings
-    chosen = [replace(recording, label=label) for recording in recordings if recording.label in (label, "")]
+def label_of_file(path: Path) -> str:
+    """What a file is named after, without the number of the recording: reach for reach_03.csv."""
+    return re.sub(r"[\s_.-]*(\d+|\(\d+\))?$", "", path.stem)
+
+
+def _named_by(path: Path, recording: "Demonstration", library: "PrimitiveLibrary") -> "Demonstration":
+    """A recording without a label with that of its file, if it is one of the library."""
+    name = label_of_file(path)
+    return replace(recording, label=name) if not recording.label and name in library else recording
+
+
+def _read(paths: Sequence[Path], columns: Sequence[str] | None, dt: float | None) -> list[tuple[Path, "Demonstration"]]:
+    """Every recording with its file; what had to be done to its samples is said on standard error."""
+    from probdmp.io import read_demonstrations
+
+    found: list[tuple[Path, Demonstration]] = []
+    for path in paths:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", RecordingWarning)
+            found += [(path, d) for d in read_demonstrations(path, columns=columns, dt=dt)]
+        for warning in caught:
+            print(f"probdmp: {warning.message}", file=sys.stderr)
+    return found
+
+
+def _labelled(found: Sequence[tuple[Path, "Demonstration"]], label: str) -> list[tuple[Path, "Demonstration"]]:
+    """Those with the label; those without any count if their files are named after it, or if no file is."""
+    names = [d.label or label_of_file(path) for path, d in found]
+    by_file = any(name == label and not d.label for name, (_, d) in zip(names, found, strict=True))
+    chosen = [
+        (path, replace(d, label=label))
+        for name, (path, d) in zip(names, found, strict=True)
+        if name == label or not (d.label or by_file)
+    ]
     if not chosen:
-        present = ", ".join(map(repr, sorted({recording.label for recording in recordings})))
+        present = ", ".join(map(repr, sorted({d.label for _, d in found})))
         raise UsageError(f"--label to be one of those in the file: {present}", repr(label))
     return chosen

@@ -9,6 +9,7 @@ from probdmp.cli.options import (
     Label,
     ModelFile,
     OutputArrays,
+    SampleStep,
     Start,
     StartVelocity,
     TaskOptions,
@@ -31,6 +32,7 @@ def smooth(
     goal: Goal = None,
     duration: Duration = None,
     start_velocity: StartVelocity = None,
+    dt: SampleStep = None,
     output: OutputArrays = None,
     as_json: Json = False,
 ) -> None:
@@ -43,7 +45,7 @@ def smooth(
     check_output(output, ".npz")
     from probdmp.estimator import PrimitiveLibrary
 
-    name, primitive, recording = read_recording(execution, PrimitiveLibrary.load(model), label, index)
+    name, primitive, recording = read_recording(execution, PrimitiveLibrary.load(model), label, index, dt)
     smoothed = primitive.smooth(recording, **TaskOptions(start, goal, duration, start_velocity).arguments(primitive.primitive_))
     arrays = {"label": name, "index": index, **trajectory_arrays(smoothed)}
     if output is not None:

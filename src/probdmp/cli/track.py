@@ -11,6 +11,7 @@ from probdmp.cli.options import (
     Label,
     ModelFile,
     OutputArrays,
+    SampleStep,
     Start,
     StartVelocity,
     TaskOptions,
@@ -36,6 +37,7 @@ def track(
     goal: Goal = None,
     duration: Duration = None,
     start_velocity: StartVelocity = None,
+    dt: SampleStep = None,
     output: OutputArrays = None,
     as_json: Json = False,
 ) -> None:
@@ -49,7 +51,7 @@ def track(
     check_output(output, ".npz")
     from probdmp.estimator import PrimitiveLibrary
 
-    name, primitive, recording = read_recording(execution, PrimitiveLibrary.load(model), label, index)
+    name, primitive, recording = read_recording(execution, PrimitiveLibrary.load(model), label, index, dt)
     tracked = primitive.track(recording, **TaskOptions(start, goal, duration, start_velocity).arguments(primitive.primitive_))
     arrays = {"label": name, "index": index, **trajectory_arrays(tracked)}
     total = float(tracked.log_likelihoods.sum())

@@ -6,6 +6,7 @@ from probdmp.demonstrations.extent import largest_extent, mean_ranges
 from probdmp.demonstrations.faults import BENIGN, FAILURE, FAULTS, SENSOR, Fault, fault_named
 from probdmp.demonstrations.letters import LETTERS, WriterVariation, WrittenLetter, synthetic_letters, written_letters
 from probdmp.demonstrations.movement_faults import hold
+from probdmp.demonstrations.perturbation import ONSETS, fault_generator, perturb_executions
 from probdmp.demonstrations.resampling import demonstration_from_times, positions_on_phases
 from probdmp.demonstrations.sigma_lognormal import Strokes
 from probdmp.demonstrations.smoothing import SmoothPath, noise_stds, smooth_path, without_noise
@@ -16,6 +17,7 @@ __all__ = [
     "FAILURE",
     "FAULTS",
     "LETTERS",
+    "ONSETS",
     "SENSOR",
     "ArmMovement",
     "ArmVariation",
@@ -29,11 +31,13 @@ __all__ = [
     "WrittenLetter",
     "as_demonstrations",
     "demonstration_from_times",
+    "fault_generator",
     "fault_named",
     "hold",
     "largest_extent",
     "mean_ranges",
     "noise_stds",
+    "perturb_executions",
     "positions_on_phases",
     "smooth_path",
     "stack_positions",

@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from probdmp.checks import FloatArray, check_array, check_seconds, shape_text
+from probdmp.demonstrations.clock import sampled_on_grid
 from probdmp.demonstrations.demonstration import LONGEST_RECORDING, Demonstration
 from probdmp.errors import InputError
 
-__all__ = ["demonstration_from_times", "positions_on_phases"]
+__all__ = ["CLOCK_TOLERANCE", "demonstration_from_times", "positions_on_phases"]
 
 CLOCK_TOLERANCE = 1e-3
 """Fraction of a step by which the last time may miss a sample."""
@@ -55,9 +56,8 @@ def demonstration_from_times(
     n_steps = float(since[-1]) / step + CLOCK_TOLERANCE
     if n_steps >= LONGEST_RECORDING:
         raise InputError(f"at most {LONGEST_RECORDING} samples", f"{n_steps:.3g}", "Choose a larger dt, or cut.")
-    grid = step * np.arange(int(n_steps) + 1)
-    resampled = np.column_stack([np.interp(grid, since, column) for column in path.T])
-    return Demonstration(resampled, step, label, names, units)
+    grid = step * np.arange(int(n_steps) + 1, dtype=np.float64)
+    return Demonstration(sampled_on_grid(since, path, grid), step, label, names, units)
 
 
 def positions_on_phases(demonstrations: Sequence[Demonstration], n_phases: int) -> FloatArray:

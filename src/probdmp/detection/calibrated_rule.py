@@ -4,7 +4,7 @@ Executions that are told their goal and duration and executions that are not dif
 calibration for each. Unless tasks are given, both are made, from demonstrations that are told where they end, or not.
 """
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, fields
 from functools import cached_property
 from typing import Any, Protocol, Self
@@ -73,18 +73,23 @@ class CalibratedRule:
         self._primitives = primitives
 
     @classmethod
-    def fit(cls, options: DetectorOptions, library: Library) -> Self:
-        """Calibrate on the recordings of the library."""
+    def fit(cls, options: DetectorOptions, library: Library, on_part: Callable[[str, int], None]) -> Self:
+        """Calibrate on the recordings of the library; `on_part` is told after each part, with the number of all."""
         family: Family
         family = TrajectoryFamily.fit(library) if options.statistic == "trajectory" else InnovationFamily(options.statistic)
         primitives = {label: member.primitive for label, member in library.members.items()}
-        calibrations = {}
-        for knows_goal in (True, False):
-            tasks = {label: _tasks(member, knows_goal) for label, member in library.members.items()}
-            if all(tasks.values()):
-                calibrations[knows_goal] = _calibrate(options, family, library, tasks)
-        if not calibrations:
+        told = {
+            knows_goal: {label: _tasks(member, knows_goal) for label, member in library.members.items()}
+            for knows_goal in (True, False)
+        }
+        told = {knows_goal: tasks for knows_goal, tasks in told.items() if all(tasks.values())}
+        if not told:
             raise InputError("tasks that all tell the goal, or that all do not", "some of each")
+        n_parts = len(told) * len(primitives)
+        calibrations = {
+            knows_goal: _calibrate(options, family, library, tasks, lambda label: on_part(label, n_parts))
+            for knows_goal, tasks in told.items()
+        }
         return cls(options, family, primitives, calibrations)
 
     def calibration(self, primitive: Primitive, task: Task) -> Calibration:
@@ -185,9 +190,13 @@ def _last_seen(recording: Demonstration) -> FloatArray:
 
 
 def _calibrate(
-    options: DetectorOptions, family: Family, library: Library, tasks: Mapping[str, Sequence[Task]]
+    options: DetectorOptions,
+    family: Family,
+    library: Library,
+    tasks: Mapping[str, Sequence[Task]],
+    done: Callable[[str], None],
 ) -> dict[str, Calibration]:
-    """Calibrations by label, or one for all."""
+    """Calibrations by label, or one for all; `done` is told each label."""
     for label, member in library.members.items():
         if options.calibration == "leave_one_out" and len(member.recordings) < 2:
             hint = 'Record more, or give others with calibration="held_out".'
@@ -195,7 +204,10 @@ def _calibrate(
     judge = family.left_out_maxima if options.calibration == "leave_one_out" else family.maxima
     labels = list(library.members)
     # One after another: the linear algebra has threads of its own, and more of them get in each other's way.
-    found = [judge(library.members[label], tasks[label]) for label in labels]
+    found = []
+    for label in labels:
+        found.append(judge(library.members[label], tasks[label]))
+        done(label)
     maxima = dict(zip(labels, found, strict=True))
     of_each = {label: [label] * len(values) for label, values in maxima.items()}
     if not options.pooled:

@@ -1,6 +1,6 @@
 """Failure detectors: what is normal for each primitive, the same online and over recordings."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Self
 
 import numpy as np
@@ -70,6 +70,7 @@ class FailureDetector:
         demonstrations: Recordings | Mapping[str, Recordings],
         dt: float | None = None,
         tasks: Sequence[Task] | Mapping[str, Sequence[Task]] | None = None,
+        on_part: Callable[[str, int], None] = lambda label, n_parts: None,
     ) -> Self:
         """Learn what is normal.
 
@@ -80,6 +81,8 @@ class FailureDetector:
         dt : seconds between samples of bare arrays; as learned unless given.
         tasks : what each demonstration was asked to do. Unless given, the detector prepares for executions that are told
             nothing but their start, and, where it is calibrated, for those that are told their goal and duration as well.
+        on_part : of the calibrated rule, for a progress bar: called after each part of the calibration with the label it was
+            about and the number of all parts.
         """
         check_choice(self.rule, "rule", RULES)
         library = Library.of(learned, demonstrations, dt, tasks)
@@ -89,7 +92,7 @@ class FailureDetector:
         else:
             options = self._options()
             library.check_taught(options.calibration == "leave_one_out")
-            rule = CalibratedRule.fit(options, library)
+            rule = CalibratedRule.fit(options, library, on_part)
         # Together, and only now: a fit that fails leaves the detector as it was.
         self.rule_, self.primitives_ = rule, {label: member.primitive for label, member in library.members.items()}
         return self

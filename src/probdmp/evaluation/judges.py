@@ -22,6 +22,7 @@ from probdmp.learning import LearningOptions, fit_primitive
 __all__ = [
     "DETECTORS",
     "READINGS",
+    "STAGES",
     "Judge",
     "Progress",
     "Reading",
@@ -32,7 +33,9 @@ __all__ = [
 ]
 
 Progress = Callable[[str], None]
-"""Called by a judge with its label after each class."""
+"""Called by a judge with its label after each class; by the calibrated one after each of its stages."""
+STAGES = {"calibrated": 3}
+"""By judge: how often it calls for each class, if more than once: learned, calibrated, judged."""
 Judge = Callable[[Sequence[Trial], Experiment, Progress], Assessment]
 """(trials of one seed, the experiment with that seed, progress) to one outcome for each test, in the order of the trials."""
 
@@ -107,10 +110,14 @@ def _judge_by_paper(reading: Reading, trials: Sequence[Trial], experiment: Exper
 
 def judge_by_calibrated(trials: Sequence[Trial], experiment: Experiment, on_class: Progress) -> Assessment:
     """The calibrated detector: every class taught with its variation, all of them calibrated together."""
-    primitives = {trial.label: _varied_primitive(trial, experiment) for trial in trials}
+    primitives: dict[str, Primitive] = {}
+    for trial in trials:
+        primitives[trial.label] = _varied_primitive(trial, experiment)
+        on_class(trial.label)
     detector = FailureDetector(experiment.false_alarm_rate)
     asked = {t.label: commanded_tasks(primitives[t.label], t.training, experiment.task) for t in trials}
-    detector.fit(primitives, {trial.label: trial.training for trial in trials}, tasks=asked)
+    training = {trial.label: trial.training for trial in trials}
+    detector.fit(primitives, training, tasks=asked, on_part=lambda label, n_parts: on_class(label))
     outcomes: list[Outcome] = []
     for trial in trials:
         outcomes += _judged(trial, detector, primitives[trial.label], experiment)

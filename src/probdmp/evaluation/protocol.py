@@ -103,7 +103,8 @@ def evaluate(
     Parameters
     ----------
     judges : who decides, by name; those of `DETECTORS[experiment.detector]` unless given.
-    on_class : called with its label after each class, once for each judge and seed, for a progress bar.
+    on_class : called with its label after each class, for each judge and seed once or as often as `STAGES` says: for a
+        progress bar.
 
     Raises
     ------

@@ -1,22 +1,18 @@
 """The executions of an experiment: who teaches, who is judged, and what is done to them."""
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 import numpy as np
 
-from probdmp.checks import FloatArray
-from probdmp.demonstrations import Demonstration, Fault, fault_named
+from probdmp.demonstrations import ONSETS, Demonstration, fault_generator, fault_named, perturb_executions
 from probdmp.dmp import Primitive, Task, task_for
 from probdmp.errors import TooFewDemonstrationsError
 from probdmp.evaluation.experiment import Experiment
 
 __all__ = ["ONSETS", "UNDISTURBED", "Trial", "commanded_tasks", "draw_trials", "group_by_label"]
 
-ONSETS = (0.3, 0.7)
-"""Faults begin in this part of the movement."""
 UNDISTURBED = "undisturbed"
 """Under this name the executions as recorded stand beside those with faults."""
 
@@ -83,23 +79,9 @@ def _draw(label: str, splits: Mapping[str, Split], experiment: Experiment) -> Tr
     onsets: dict[str, list[int]] = {}
     faulty: dict[str, list[Demonstration]] = {}
     for fault in map(fault_named, experiment.faults):
-        # 256 is no byte: it keeps the label apart from the name.
-        rng = np.random.default_rng([experiment.seed, *label.encode(), 256, *fault.kind.encode()])
-        onsets[fault.name] = [_onset(fault, d.n_samples, rng) for d in tests]
-        faulty[fault.name] = [
-            replace(d, positions=fault(d.positions, onset, rng, _comparable(d, others)), channels={})
-            for d, onset in zip(tests, onsets[fault.name], strict=True)
-        ]
+        rng = fault_generator(experiment.seed, label, fault)
+        faulty[fault.name], onsets[fault.name] = perturb_executions(fault, tests, others, rng)
     return Trial(label, training, tests, onsets, faulty)
-
-
-def _onset(fault: Fault, n_samples: int, rng: np.random.Generator) -> int:
-    return 0 if fault.takes_others else max(1, int(rng.uniform(*ONSETS) * n_samples))
-
-
-def _comparable(execution: Demonstration, others: Sequence[Demonstration]) -> list[FloatArray]:
-    """Positions of those at the same rate with as many degrees of freedom."""
-    return [o.positions for o in others if o.n_dof == execution.n_dof and math.isclose(o.dt, execution.dt, rel_tol=1e-6)]
 
 
 def _classes(demonstrations: Sequence[Demonstration], needed: int) -> dict[str, list[Demonstration]]:

@@ -1,6 +1,7 @@
 """Files to values and back: demonstrations in several formats, models in one that can be trusted."""
 
 from probdmp.io.atomic import write_atomically
+from probdmp.io.csv import read_csv, write_csv
 from probdmp.io.formats import read_demonstrations, write_demonstrations
 from probdmp.io.json_document import read_json
 from probdmp.io.model_contents import ModelContents
@@ -11,11 +12,13 @@ __all__ = [
     "ModelContents",
     "decode_model",
     "encode_model",
+    "read_csv",
     "read_demonstrations",
     "read_json",
     "read_model",
     "read_npz",
     "write_atomically",
+    "write_csv",
     "write_demonstrations",
     "write_model",
     "write_npz",

@@ -8,24 +8,20 @@
     units      text, optional: unit of the positions
     positions  (D) text, optional: which columns are positions, where their names do not say so
 
-Columns named x, y, z or q… are positions; the others are sensor channels.
+`recordings` says which columns are positions.
 """
 
-import re
 import sys
-from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from probdmp.errors import DataFileError
 from probdmp.io.archive import HINT
+from probdmp.io.recordings import MOST_COLUMNS, MOST_DEMONSTRATIONS, Recordings, listing
 
-__all__ = ["MOST_COLUMNS", "MOST_DEMONSTRATIONS", "Recordings", "check_recordings", "listing", "positions_by_name"]
-
-MOST_DEMONSTRATIONS = 100_000
-MOST_COLUMNS = 1000
+__all__ = ["check_recordings"]
 
 LAYOUT = {
     "data": ("fiu", 2),
@@ -41,18 +37,6 @@ KINDS = {"fiu": "real numbers", "iu": "whole numbers", "U": "text"}
 WIDEST_NUMBER = 8
 """Bytes; what is wider may not fit into a float64."""
 DEFAULTS = {"units": np.array(""), "positions": np.array([], dtype=str)}
-
-
-class Recordings(NamedTuple):
-    """The checked content of a file; the fields are in the module's docstring."""
-
-    data: NDArray[Any]
-    offsets: list[int]
-    labels: list[str]
-    dt: float
-    columns: list[str]
-    units: str
-    positions: list[str]
 
 
 def check_recordings(arrays: dict[str, NDArray[Any]], name: str) -> Recordings:
@@ -80,22 +64,13 @@ def check_recordings(arrays: dict[str, NDArray[Any]], name: str) -> Recordings:
     for key, (kinds, _) in LAYOUT.items():
         if kinds == "U" and np.any(_code_points(arrays[key]) > sys.maxunicode):
             raise DataFileError(f"array {key!r} of text in {name}", "a number that is no character", HINT)
-    recordings = Recordings(data=arrays["data"], **{key: arrays[key].tolist() for key in LAYOUT if key != "data"})
+    values = {key: arrays[key].tolist() for key in LAYOUT if key != "data"}
+    units = [values.pop("units")] * len(values["columns"])
+    recordings = Recordings(data=arrays["data"], units=units, **values)
     for key, columns in (("columns", recordings.columns), ("positions", recordings.positions)):
         if len(set(columns)) < len(columns) or not set(columns) <= set(recordings.columns):
             raise DataFileError(f"different names of columns as {key!r} in {name}", listing(map(repr, columns)), HINT)
     return recordings
-
-
-def positions_by_name(columns: Iterable[str]) -> list[str]:
-    """The columns whose names say that they are positions."""
-    return [column for column in columns if re.fullmatch(r"x|y|z|q.*", column)]
-
-
-def listing(items: Iterable[object], most: int = 40) -> str:
-    """Items for a message, the first few of many."""
-    texts = list(map(str, items))
-    return ", ".join(texts[:most]) + (f" and {len(texts) - most} more" if len(texts) > most else "")
 
 
 def _check_lengths(arrays: dict[str, NDArray[Any]], name: str) -> None:
