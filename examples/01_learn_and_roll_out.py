@@ -10,8 +10,9 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 
 from probdmp import ProbabilisticDMP, synthetic_letters
-from probdmp.plotting.style import figure_style
-from probdmp.plotting.trajectories import plot_paths, plot_rollout
+from probdmp.plotting.demonstrations import plot_demonstrated_paths
+from probdmp.plotting.style import MEAN, figure_style
+from probdmp.plotting.trajectories import plot_rollout
 
 
 def main(figure_path: Path) -> None:
@@ -24,7 +25,8 @@ def main(figure_path: Path) -> None:
 
     with figure_style():
         figure, (path, position, velocity) = plt.subplots(1, 3, figsize=(10, 3.2), layout="constrained")
-        plot_paths(path, demonstrations, rollout).set_title("Demonstrations and mean")
+        plot_demonstrated_paths(path, demonstrations, start=rollout.positions[0]).set_title("Demonstrations and mean")
+        path.plot(*rollout.positions.T, color=MEAN, linewidth=2)
         plot_rollout(position, rollout, dof=0).set_title("Position, 95 % band")
         plot_rollout(velocity, rollout, dof=0, quantity="velocity").set_title("Velocity, 95 % band")
         figure.savefig(figure_path, dpi=150)

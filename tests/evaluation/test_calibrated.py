@@ -80,7 +80,7 @@ def test_the_calibration_is_on_the_training_demonstrations(evaluation, experimen
 def test_a_higher_rate_is_the_lower_threshold_of_the_calibration(demos, experiment, evaluation, outcomes):
     """Asking for another rate and moving the threshold of the traces come to the same, but for moments within one sample."""
     (facts,) = evaluation.by_seed[0]["calibrated"].calibrations
-    moved = at_level(outcomes, facts.thresholds[0.01] / facts.threshold)
+    moved = [moved for o in outcomes for moved in at_level([o], facts.relative_level(0.01, o.label))]
     asked = evaluate(demos, replace(experiment, false_alarm_rate=0.01, traces=False)).outcomes["calibrated"]
     pairs = [(a.alarms[f], b.alarms[f]) for a, b in zip(moved, asked, strict=True) for f in ("hold", "slow", "wrong_class")]
     assert all((a is None) == (b is None) for a, b in pairs)
