@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from probdmp.detection.path_model import CLOCK_STD, NOISE_FLOOR, path_model
+from probdmp.detection.path_model import CLOCK_SHARE, CLOCK_STD, NOISE_FLOOR, path_model
 from probdmp.detection.phase_clock import TICKS
 from probdmp.detection.profile import ExecutionProfile
 from probdmp.dmp import path_distribution
@@ -28,9 +28,10 @@ def dense(primitive):
 
 
 @pytest.fixture(scope="module")
-def clock(dense):
+def clock(primitive, dense):
     """(M D, M D) covariance of m'(t) e_t - m'(0) e_0 where the times e of samples are off independently."""
-    slopes = CLOCK_STD * np.gradient(dense[0].reshape(-1, 2), axis=0)
+    std = max(CLOCK_STD, CLOCK_SHARE * TICKS * primitive.phase_step)
+    slopes = std * np.gradient(dense[0].reshape(-1, 2), axis=0)
     errors = np.zeros((TICKS + 1, 2, TICKS + 1))
     for t in range(1, TICKS + 1):
         errors[t, :, t], errors[t, :, 0] = slopes[t], -slopes[0]

@@ -22,7 +22,9 @@ __all__ = ["PathModel", "path_model"]
 NOISE_FLOOR = 0.01
 """Standard deviation of what a path is measured with at the least, as a fraction of the range."""
 CLOCK_STD = 0.3
-"""c, ticks: standard deviation of the time at which a sample was really taken."""
+"""c, ticks, at the least: standard deviation of the time at which a sample was really taken."""
+CLOCK_SHARE = 12**-0.5
+"""And this share of the time between samples: a sample may have been taken at any moment of its own step."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,12 +68,13 @@ def path_model(primitive: Primitive, profile: ExecutionProfile, knows_goal: bool
         phases = np.linspace(0.0, 1.0, TICKS + 1)
         stretch = profile.tempo_std * phases[:, None] * np.gradient(means, phases, axis=0)
         covariance = covariance + np.multiply.outer(stretch, stretch)
-    return PathModel(means, covariance + _clock_covariance(means), gains, noise)
+    clock = max(CLOCK_STD, CLOCK_SHARE * TICKS * primitive.phase_step)
+    return PathModel(means, covariance + _clock_covariance(means, clock), gains, noise)
 
 
-def _clock_covariance(means: FloatArray) -> FloatArray:
+def _clock_covariance(means: FloatArray, clock: float) -> FloatArray:
     """What uncertain times of samples add, (M, D, M, D); displacements count from the first, so its error is in all others."""
-    moved = CLOCK_STD * np.gradient(means, axis=0)
+    moved = clock * np.gradient(means, axis=0)
     covariance = np.zeros((*means.shape, *means.shape))
     covariance[1:, :, 1:, :] = np.multiply.outer(moved[0], moved[0])[None, :, None, :]
     ticks = np.arange(1, len(means))
