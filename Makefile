@@ -9,7 +9,7 @@ BENCH := benchmarks/.venv
 SOURCES := $(shell find src -name '*.py')
 GALLERY := $(patsubst examples/%.py,build/gallery/%.png,$(wildcard examples/*.py))
 
-.PHONY: demo test test-slow lint types docs gallery n-basis figures results variation detection bench-env bench-detection clean
+.PHONY: demo test test-slow coverage lint types docs gallery n-basis figures results variation detection bench-env bench-detection clean
 
 demo: $(VENV)/.demo
 	$(BIN)/probdmp demo
@@ -19,6 +19,10 @@ test: $(VENV)/.test
 
 test-slow: $(VENV)/.test
 	$(BIN)/python -m pytest -n auto -m slow
+
+# The same tests as make test, and which lines of the library they run; fewer than 95 % are an error.
+coverage: $(VENV)/.dev
+	$(BIN)/python -m pytest -n auto --cov=probdmp --cov-report=term:skip-covered --cov-fail-under=95
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
