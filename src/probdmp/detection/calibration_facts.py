@@ -36,7 +36,8 @@ class CalibrationFacts:
     thresholds: Mapping[float, float]
     """By rate: what the threshold would be if it were asked for."""
     suspects: Mapping[str, float]
-    """Primitives with more executions among the most surprising tenth than chance explains: label to their share of it."""
+    """Primitives with more executions among the most surprising tenth than chance explains, or that rank higher throughout than
+    it explains: label to the share of their executions in that tenth."""
     own_thresholds: Mapping[str, float]
     """The higher thresholds of the suspects, by label."""
     suspects_at: Mapping[float, Mapping[str, float]]

@@ -12,6 +12,7 @@ from probdmp.plotting.operating import failures_of, onset_panels, operating_pane
 from probdmp.plotting.page import code, definitions, figure, heading, note, page, paragraph
 from probdmp.plotting.panels import Panel
 from probdmp.plotting.report_tables import (
+    FLAGGED,
     calibration_table,
     comparison_table,
     fault_tables,
@@ -36,9 +37,8 @@ TOLD = {
 }
 RATES_NOTE = """Counts, rates and 95 % intervals. Latency: from the onset of the fault to the alarm, in percent of the duration
 of the movement."""
-CALIBRATION_CAPTION = """α is per execution. <em>Attainable</em>: the least rate that n calibration executions can vouch for,
-1 / (n + 1). <em>Flagged</em>: movements with more calibration executions above the threshold than chance explains, and their
-share. Grey: where the realised rate lies in 95 % of splits if executions are exchangeable."""
+CALIBRATION_CAPTION = f"""α is per execution. <em>Attainable</em>: the least rate that n calibration executions can vouch for,
+1 / (n + 1). {FLAGGED} Grey: where the realised rate lies in 95 % of splits if executions are exchangeable."""
 OPERATING_CAPTION = """First what is detected when the threshold is moved, against the false alarms it then raises (crosses: as
 set); an alarm before the onset is a miss, so a curve may fall. Then, for each failure, the share detected within a time since
 the onset{several}."""

@@ -12,7 +12,7 @@ from probdmp.execution import position_covariances, roll_out
 from probdmp.plotting.forcing import forcing_panels
 from probdmp.plotting.page import code, definitions, figure, heading, note, page, paragraph, table
 from probdmp.plotting.panels import Panel
-from probdmp.plotting.report_tables import calibration_table, percent
+from probdmp.plotting.report_tables import FLAGGED, calibration_table, percent
 from probdmp.plotting.style import require_matplotlib
 from probdmp.plotting.trajectories import path_panel, plot_rollout
 
@@ -26,10 +26,9 @@ BANDS_CAPTION = """Positions as planned, with 95 % bands; and the forcing term w
 NO_DETECTOR = """The file has no failure detector."""
 VOUCHES = """The detector was asked for {asked} false alarms per execution. {n} calibration executions can vouch for no less
 than {attainable}, so {verdict}."""
-CAPTION = """α is per execution. <em>Known</em>: for executions that are told their goal and duration; <em>nominal</em>: for
+CAPTION = f"""α is per execution. <em>Known</em>: for executions that are told their goal and duration; <em>nominal</em>: for
 those told their start only. <em>Attainable</em>: the least rate that n calibration executions can vouch for, 1 / (n + 1).
-<em>Flagged</em>: movements with more calibration executions among the most surprising tenth than chance explains, and their
-share."""
+{FLAGGED}"""
 MADE = {
     "Duration, from, to": "Means over the demonstrations.",
     "Sensor noise": "Standard deviation of single measurements around the movement, as learned from the demonstrations.",
