@@ -8,8 +8,8 @@ from probdmp.plotting.page import table
 
 __all__ = ["FLAGGED", "calibration_table", "comparison_table", "fault_tables", "is_papers", "percent", "realized_table"]
 
-FLAGGED = """<em>Flagged</em>: movements with more calibration executions among the most surprising tenth than chance explains, or
-that rank higher throughout than it explains; in brackets the share of their executions in that tenth."""
+FLAGGED = """<em>Flagged</em>: movements with more calibration executions among the most surprising tenth than chance explains,
+or that rank higher throughout than it explains; in brackets the share of their executions in that tenth."""
 
 NATURES: Sequence[tuple[str, tuple[str, str], Callable[[FaultSummary], Rate | None]]] = (
     ("failure", ("Failure", "Detected at or after the onset"), lambda figures: figures.detected),
