@@ -131,7 +131,9 @@ ABLATIONS: Mapping[str, Callable[[], None]] = {
     "leaving out (judged in-sample)": in_sample,
 }
 """What is taken away, by its name; only ever in a process of its own."""
-ABLATED = {name: DATA[name]._replace(faults=("hold", "push:0.25", "wrong_goal")) for name in ("UCI letters", "Calinon letters")}
+ABLATED = {
+    name: DATA[name]._replace(faults=("hold", "push:0.25", "wrong_goal", "slow")) for name in ("UCI letters", "Calinon letters")
+}
 
 
 # --- running ----------------------------------------------------------------------------------------------------------
@@ -242,16 +244,14 @@ def worst_text(result: Result) -> str:
 
 def ablation_table(found: Mapping[Job, Assessment]) -> Iterator[str]:
     names = ["", *ABLATIONS]
-    table = [
-        ["without", *(f"{data}: {what}" for data in ABLATED for what in ("false alarms", "hold", "push:0.25", "wrong_goal"))]
-    ]
+    table = [["without", *(f"{data}: {what}" for data in ABLATED for what in ("false alarms", *ABLATED[data].faults))]]
     for name in names:
         cells = []
         for data in ABLATED:
             summary = pooled(found, data, "known", name or "nothing").summary
             faults = summary.faults
             cells += [f"{100 * summary.false_alarms.rate:.1f}", f"{ever(faults['hold'])}, {faults['hold'].latency_in_percent}"]
-            cells += [ever(faults["push:0.25"]), ever(faults["wrong_goal"])]
+            cells += [ever(faults[fault]) for fault in ("push:0.25", "wrong_goal", "slow")]
         table.append([name or "– (all of it)", *cells])
     return rows(table)
 
