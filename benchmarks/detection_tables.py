@@ -35,7 +35,8 @@ Written by `make bench-detection`, two splits each. [README.md](README.md) says 
 The threshold of each detector is the lowest at which at most {100 * ALPHA:g} % of the undisturbed executions raise an
 alarm, whatever its calibration; *detected* is a first alarm at or after the onset, in % of the executions, with a 95 %
 interval by bootstrap over classes. The best of each column is bold. Latency: of hold, median / 95th percentile, % of the
-duration.
+duration. Alarms about a sensor do not depend on the threshold, so the calibrated detector's false alarms may stay above the
+rate, where recordings repeat numbers.
 """
 
 
