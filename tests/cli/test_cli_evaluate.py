@@ -233,7 +233,13 @@ def test_demo_prints_the_document_of_the_evaluation(run, tmp_path, monkeypatch):
     experiment, paper = Experiment(2, 2, 3, "calibrated", traces=True), READINGS[0].name
     judges = {**DETECTORS["calibrated"], paper: DETECTORS["paper"][paper]}
     expected = evaluate_directly(synthetic_letters(4, 3, "l"), experiment, judges)
-    assert json.loads(result.stdout) == as_json(expected, "probdmp demo --letters l --train 2 --test 2 --seed 3")
+    assert json.loads(result.stdout) == as_json(expected, "probdmp demo --letters l --train 2 --test 2 --seed 3 --fault hold")
+
+
+def test_demo_puts_in_the_faults_that_it_is_asked_for(run, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    document = json.loads(run(*DEMO, "--fault", "push:0.4,jitter", "-o", tmp_path / "r.html", "--json").stdout)
+    assert list(document["faults"]) == ["push:0.4", "jitter"]
 
 
 def test_demo_refuses_before_it_works(run, tmp_path):

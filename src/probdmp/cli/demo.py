@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from probdmp.cli.evaluate import Test, Train, evaluation_of, write_evaluation
+from probdmp.cli.evaluate import Faults, Test, Train, evaluation_of, faults_of, write_evaluation
 from probdmp.cli.evaluation_table import print_evaluation
 from probdmp.cli.exit_codes import message, usage
 from probdmp.cli.options import Json, Seed, check_output
@@ -27,6 +27,7 @@ def demo(
     train: Train = 10,
     test: Test = 10,
     seed: Seed = 0,
+    fault: Faults = "hold",
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="FILE.html", help="Report with the table and figures.")
     ] = Path("report.html"),
@@ -46,11 +47,11 @@ def demo(
 
     letters = LETTERS if letters is None else letters
     with usage():
-        experiment = Experiment(train, test, seed, detector="calibrated", traces=True)
+        experiment = Experiment(train, test, seed, detector="calibrated", faults=faults_of(fault), traces=True)
         demonstrations = synthetic_letters(train + test, seed, letters)
     paper = READINGS[0].name
     result = evaluation_of(demonstrations, experiment, {**DETECTORS["calibrated"], paper: DETECTORS["paper"][paper]})
-    command = f"probdmp demo --letters {letters} --train {train} --test {test} --seed {seed}"
+    command = f"probdmp demo --letters {letters} --train {train} --test {test} --seed {seed} --fault {fault}"
     if as_json:
         print_json(result.as_dict(command))
     else:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from probdmp.demonstrations import Demonstration
     from probdmp.evaluation import Evaluation, Experiment, Judge
 
-__all__ = ["Test", "Train", "evaluate", "evaluation_of", "write_evaluation"]
+__all__ = ["Faults", "Test", "Train", "evaluate", "evaluation_of", "faults_of", "write_evaluation"]
 
 Train = Annotated[int, typer.Option(metavar="N", help="Demonstrations per class that teach the primitive.")]
 FAULT_HELP = """What is injected, with commas between, or all. Failures: hold (blocked), hold_release (for a while), slow, push
@@ -31,6 +31,7 @@ WHY = {
 }
 """By detector: why an option of the other is refused."""
 Test = Annotated[int, typer.Option(metavar="N", help="Other demonstrations per class that are judged.")]
+Faults = Annotated[str, typer.Option("--fault", metavar="NAMES", help=FAULT_HELP)]
 
 
 def evaluate(
@@ -48,7 +49,7 @@ def evaluate(
         ),
     ] = "calibrated",
     false_alarm_rate: FalseAlarmRate = None,
-    fault: Annotated[str, typer.Option(metavar="NAMES", help=FAULT_HELP)] = "hold",
+    fault: Faults = "hold",
     task: Annotated[
         str,
         typer.Option(metavar="NAME", help="known: start, goal and duration are commanded; nominal: only the start is."),
@@ -78,7 +79,7 @@ def evaluate(
             detector,
             false_alarm_rate,
             configuration,
-            {"train": train, "test": test, "seed": seed, "seeds": seeds, "task": task, "faults": _faults(fault)},
+            {"train": train, "test": test, "seed": seed, "seeds": seeds, "task": task, "faults": faults_of(fault)},
         )
     if report is not None:
         from probdmp.plotting.style import require_matplotlib
@@ -162,7 +163,8 @@ def _command(given: Sequence[str], experiment: "Experiment", configuration: str 
     return join([*words, *_given("--configuration", configuration)])
 
 
-def _faults(text: str) -> tuple[str, ...]:
+def faults_of(text: str) -> tuple[str, ...]:
+    """What `--fault` names, each once."""
     from probdmp.demonstrations import FAULTS
 
     named = [[*FAULTS] if name == "all" else [name] for name in names_of(text) or ()]
