@@ -2,6 +2,7 @@
 
 import re
 import shlex
+from glob import glob
 from pathlib import Path
 
 import pytest
@@ -30,6 +31,8 @@ def run_command(line: str) -> None:
         return
     given = Path(words[words.index("<") + 1]).read_text() if "<" in words else None
     arguments = words[1 : words.index("<")] if "<" in words else words[1:]
+    # As a shell does: names for a pattern, or the word as it is.
+    arguments = [name for word in arguments for name in (sorted(glob(word)) if "*" in word else []) or [word]]
     result = CliRunner().invoke(app, arguments, input=given, prog_name="probdmp")
     # 4: monitor has found a failure.
     assert result.exit_code in ((0, 4) if arguments[0] == "monitor" else (0,)), f"{line}: {result.stderr}"

@@ -10,7 +10,7 @@ import typer
 
 from probdmp.cli.detector_summaries import calibration_text, detector_summary, verdict_summary
 from probdmp.cli.exit_codes import FAILURE_DETECTED, UsageError, usage
-from probdmp.cli.options import Duration, Goal, Json, Label, ModelFile, Start, StartVelocity, TaskOptions
+from probdmp.cli.options import Goal, Json, Label, ModelFile, Start, StartVelocity, TaskOptions
 from probdmp.cli.output import print_json, print_line
 from probdmp.cli.recordings import primitive_of, read_executions
 from probdmp.cli.stream import StreamOptions, monitor_stream
@@ -36,7 +36,7 @@ def monitor(
     label: Label = None,
     start: Start = None,
     goal: Goal = None,
-    duration: Duration = None,
+    duration: Annotated[float | None, typer.Option(metavar="S", help="Seconds. Default: as learned.")] = None,
     start_velocity: StartVelocity = None,
     dt: Annotated[
         float | None,

@@ -194,7 +194,7 @@ def _dofs(request: PictureRequest, names: Sequence[str]) -> tuple[int, int]:
 
 TASK = ("--start", "--goal", "--duration", "--start-velocity")
 KINDS: dict[str, Kind] = {
-    "demonstrations": Kind(_demonstrations, "FILE.npz", ("--label", "--columns", "--dof")),
+    "demonstrations": Kind(_demonstrations, "FILE", ("--label", "--columns", "--dof")),
     "basis": Kind(_basis, "MODEL", ("--label",)),
     "forcing": Kind(_forcing, "MODEL", ("--label",)),
     "rollout": Kind(_rollout, "MODEL", ("--label", *TASK)),
