@@ -158,7 +158,8 @@ def test_every_fault(fault, suffix, folder, run_json, tmp_path, letters):
 
 
 def test_an_onset_for_all(folder, run, run_json, tmp_path, letters):
-    arguments = ("perturb", folder / "letters.npz", "--fault", "hold", "--onset", 0.5, "--label", "l", "-o", tmp_path / "o.csv")
+    arguments = ("perturb", folder / "letters.npz", "--fault", "hold", "--onset", 0.5, "--label", "l", "--force")
+    arguments = (*arguments, "-o", tmp_path / "o.csv")
     document = run_json(*arguments)
     assert [e["index"] for e in document["executions"]] == list(range(6, 12))
     for e, d, faulty in zip(document["executions"], letters[6:], read_demonstrations(tmp_path / "o.csv"), strict=True):
@@ -171,6 +172,16 @@ def test_an_onset_for_all(folder, run, run_json, tmp_path, letters):
         assert words in shown
     run_json(*arguments, "--seed", 1)
     assert (tmp_path / "o.csv").read_bytes() != first
+
+
+def test_recordings_are_not_replaced_unless_asked_for(folder, run, tmp_path):
+    mine = tmp_path / "mine.npz"
+    mine.write_bytes((folder / "letters.npz").read_bytes())
+    result = run("perturb", mine, "-o", mine)
+    assert result.exit_code == 2
+    assert "--force" in result.stderr
+    assert mine.read_bytes() == (folder / "letters.npz").read_bytes()
+    assert run("perturb", mine, "-o", mine, "--force").exit_code == 0
 
 
 def test_what_is_perturbed_is_noticed(folder, run_json, tmp_path):

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from probdmp.cli.exit_codes import UsageError, usage
-from probdmp.cli.options import Columns, Json, SampleStep, check_output, names_of
+from probdmp.cli.exit_codes import usage
+from probdmp.cli.options import Columns, Force, Json, SampleStep, check_recordings_output, names_of
 from probdmp.cli.output import print_json, print_line, print_table
 from probdmp.cli.recordings import read_files
 from probdmp.cli.summaries import name_text
@@ -27,7 +27,7 @@ def convert(
     ] = None,
     columns: Columns = None,
     dt: SampleStep = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace OUT if it exists.")] = False,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Convert recordings between formats; several files into one.
@@ -36,11 +36,8 @@ def convert(
     those of reach_03.csv are labelled reach.
     """
     from probdmp.io import write_demonstrations
-    from probdmp.io.formats import FORMATS
 
-    check_output(output, *FORMATS)
-    if output.exists() and not force:
-        raise UsageError("an output file that does not exist yet", repr(str(output)), "Use --force to replace it.")
+    check_recordings_output(output, force)
     recordings = read_files(files, names_of(columns), label, dt)
     with usage():
         write_demonstrations(output, recordings)

@@ -16,6 +16,7 @@ __all__ = [
     "Columns",
     "Duration",
     "ExecutionFile",
+    "Force",
     "Goal",
     "Index",
     "Json",
@@ -30,6 +31,7 @@ __all__ = [
     "StartVelocity",
     "TaskOptions",
     "check_output",
+    "check_recordings_output",
     "names_of",
 ]
 
@@ -74,6 +76,7 @@ OutputArrays = Annotated[
     typer.Option("--output", "-o", metavar="FILE.npz", help="Write times, means and stds as arrays (T, D) to this file."),
 ]
 
+Force = Annotated[bool, typer.Option("--force", help="Replace the output file if it exists.")]
 OutputRecordings = Annotated[
     Path, typer.Option("--output", "-o", metavar="FILE", help="Recordings to write (.npz, .csv).", show_default=False)
 ]
@@ -112,6 +115,15 @@ class TaskOptions:
 def names_of(text: str | None) -> Sequence[str] | None:
     """Names from a list with commas."""
     return None if text is None else [name.strip() for name in text.split(",")]
+
+
+def check_recordings_output(path: Path, force: bool) -> None:
+    """Whether recordings can be written there; none that exist are replaced unless that is asked for."""
+    from probdmp.io.formats import FORMATS
+
+    check_output(path, *FORMATS)
+    if path.exists() and not force:
+        raise UsageError("an output file that does not exist yet", repr(str(path)), "Use --force to replace it.")
 
 
 def check_output(path: Path | None, *suffixes: str) -> None:

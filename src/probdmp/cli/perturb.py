@@ -5,7 +5,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from probdmp.cli.exit_codes import UsageError, usage
-from probdmp.cli.options import Columns, Json, OutputRecordings, RecordingFiles, SampleStep, Seed, check_output, names_of
+from probdmp.cli.options import (
+    Columns,
+    Force,
+    Json,
+    OutputRecordings,
+    RecordingFiles,
+    SampleStep,
+    Seed,
+    check_recordings_output,
+    names_of,
+)
 from probdmp.cli.output import print_json, print_line, print_table
 from probdmp.cli.recordings import read_files
 from probdmp.cli.summaries import name_text
@@ -34,6 +44,7 @@ def perturb(
     columns: Columns = None,
     dt: SampleStep = None,
     seed: Seed = 0,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Put a fault into recorded executions, to see what is noticed.
@@ -43,9 +54,8 @@ def perturb(
     """
     from probdmp.demonstrations import fault_named
     from probdmp.io import write_demonstrations
-    from probdmp.io.formats import FORMATS
 
-    check_output(output, *FORMATS)
+    check_recordings_output(output, force)
     with usage():
         chosen = fault_named(fault)
     if onset is not None and not 0 < onset < 1:
