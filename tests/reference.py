@@ -2,6 +2,7 @@
 
 1. `dense_posterior`: the joint Gaussian of all states and observations of a linear system, conditioned by brute force. With
    `digits` it computes in decimal arithmetic of that many digits, and is then exact for our purposes even where R = 1e-12.
+   `parametric_posterior`: the same of states that are linear in parameters drawn once, and deviate from that.
 2. `kalman_filter`, `rts_smoother`: the textbook recursions (Bishop, sections 13.3.1 and 13.3.2) for one series.
 3. `integrate_dmp`: a movement primitive stepped through the scalar equations of Meier & Schaal 2016.
 
@@ -111,10 +112,56 @@ def dense_joint(system, digits=None):
         rows = G.reshape(T * n, n_sources)
         states = (rows @ sources @ rows.T).reshape(T, n, T, n)
         cross = np.tensordot(C, states, (1, 1)).swapaxes(0, 1)
-        observations = np.tensordot(cross, C, (3, 1))
-        for t in range(T):
-            observations[t, :, t, :] += R
-        return Joint(means, states, means @ C.T, observations, cross)
+        return _seen_through(C, R, means, states, cross)
+
+
+def _seen_through(C, R, means, states, cross):
+    observations = np.tensordot(cross, C, (3, 1))
+    for t in range(len(means)):
+        observations[t, :, t, :] += R
+    return Joint(means, states, means @ C.T, observations, cross)
+
+
+class Parametric(NamedTuple):
+    """States of which a part stands still, T times, n states, r parameters z:
+
+    s[t] = offsets[t] + designs[t] z + d[t],  z ~ N(mean, covariance);    d[t] = A d[t-1] + e[t-1],  d[0] = 0,  e ~ N(0, Q)
+    """
+
+    offsets: np.ndarray
+    """(T, n)"""
+    designs: np.ndarray
+    """(T, n, r)"""
+    mean: np.ndarray
+    """(r,)"""
+    covariance: np.ndarray
+    """(r, r)"""
+    A: np.ndarray
+    """(n, n)"""
+    Q: np.ndarray
+    """(n, n)"""
+    C: np.ndarray
+    """(O, n)"""
+    R: np.ndarray
+    """(O, O)"""
+
+
+def parametric_joint(system):
+    """Every state is a mean plus a matrix times independent sources (z - mean, e[0], .., e[T-2])."""
+    T, n, r = system.designs.shape
+    G, sources = np.zeros((T, n, r + (T - 1) * n)), np.zeros((r + (T - 1) * n,) * 2)
+    sources[:r, :r] = system.covariance
+    for t in range(T):
+        if t > 0:
+            e = slice(r + (t - 1) * n, r + t * n)
+            G[t, :, r:] = system.A @ G[t - 1, :, r:]
+            G[t, :, e] += np.eye(n)
+            sources[e, e] = system.Q
+        G[t, :, :r] = system.designs[t]
+    rows = G.reshape(T * n, -1)
+    states = (rows @ sources @ rows.T).reshape(T, n, T, n)
+    cross = np.tensordot(system.C, states, (1, 1)).swapaxes(0, 1)
+    return _seen_through(system.C, system.R, system.offsets + system.designs @ system.mean, states, cross)
 
 
 def dense_posterior(system, observations, digits=None):
@@ -124,8 +171,18 @@ def dense_posterior(system, observations, digits=None):
     """
     with localcontext() as context:
         context.prec = digits or context.prec
+        return _posterior(dense_joint(system, digits), observations, digits)
+
+
+def parametric_posterior(system, observations):
+    """The same of a `Parametric` system."""
+    return _posterior(parametric_joint(system), observations, None)
+
+
+def _posterior(joint, observations, digits):
+    with localcontext() as context:
+        context.prec = digits or context.prec
         ln, pi = (Decimal.ln, Decimal(PI)) if digits else (math.log, math.pi)
-        joint = dense_joint(system, digits)
         T, n = joint.state_means.shape
         times, sensors = np.nonzero(~np.isnan(observations))  # what was seen, in the order of time
         S = joint.observation_covariance[times, sensors][:, times, sensors]

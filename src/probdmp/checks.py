@@ -16,11 +16,15 @@ __all__ = [
     "LARGEST_MAGNITUDE",
     "MILLISECONDS_HINT",
     "SECONDS",
+    "BoolArray",
     "FloatArray",
     "check_array",
     "check_choice",
     "check_count",
     "check_fraction",
+    "check_generator",
+    "check_names",
+    "check_noise_stds",
     "check_number",
     "check_positive",
     "check_seconds",
@@ -31,6 +35,7 @@ __all__ = [
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
 LARGEST_MAGNITUDE = 1e100
 """Values beyond this are refused: variances square them, and the square must stay finite."""
@@ -167,6 +172,32 @@ def check_count(value: object, name: str, least: int = 1, most: int | None = Non
     if value < least or (most is not None and value > most):
         raise InputError(wanted, repr(value), hint)
     return int(value)
+
+
+def check_noise_stds(stds: ArrayLike, count: int) -> FloatArray:
+    """Standard deviations > 0, (count,) array."""
+    checked = check_array(stds, "stds", (count,))
+    if np.any(checked <= 0):
+        raise InputError("stds > 0", f"{checked.min():g}")
+    return checked
+
+
+def check_generator(random_state: int | np.random.Generator | None) -> np.random.Generator:
+    """Random numbers from a seed, or the generator itself."""
+    try:
+        return np.random.default_rng(random_state)
+    except (TypeError, ValueError) as error:
+        raise InputTypeError("random_state as a whole number >= 0 or a Generator", f"{random_state!r:.100}") from error
+
+
+def check_names(value: object, name: str) -> list[str]:
+    """Different names, in a list or tuple."""
+    if not isinstance(value, list | tuple) or not all(isinstance(item, str) for item in value):
+        hint = f"Write {name}=[{value!r}]." if isinstance(value, str) else ""
+        raise InputTypeError(f"{name} as a list of names", f"{value!r:.100}", hint)
+    if len(set(value)) < len(value):
+        raise InputError(f"different names in {name}", f"{value!r:.100}")
+    return list(value)
 
 
 def check_choice(value: object, name: str, choices: Collection[str], hint: str = "") -> str:

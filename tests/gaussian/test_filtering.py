@@ -20,7 +20,7 @@ from strategies import (
     systems,
 )
 
-from probdmp.gaussian import LinearGaussianModel, filter_sequence, predict, update
+from probdmp.gaussian import AffineObservation, LinearGaussianModel, filter_sequence, predict, update
 
 SCHEMES = ("exact", "semi_implicit_euler")
 
@@ -285,7 +285,8 @@ def test_step_by_step_is_the_same_as_all_at_once(model, seed):
         if t > 0:
             drift, noise = model.drifts()[t - 1], model.process_covariances()[t - 1]
             mean, covariance = predict(mean, covariance, model.transition, drift, noise)
-        step = update(mean, covariance, observation, model.observation_matrix, model.observation_covariance)
+        seen = AffineObservation(observation, model.observation_matrix, model.observation_covariance)
+        step = update(mean, covariance, seen)
         mean, covariance = step.mean, step.covariance
         np.testing.assert_allclose(np.broadcast_to(mean, result.filtered.means[t].shape), result.filtered.means[t], rtol=1e-12)
         np.testing.assert_allclose(step.log_likelihood, result.log_likelihoods[t], rtol=1e-12, atol=1e-12)
@@ -340,7 +341,8 @@ def test_covariances_stay_symmetric_and_positive_over_ten_million_steps(scheme):
             mean, covariance = predict(mean, covariance, model.transition, drifts[t - 1], noises[t - 1])
         seen = mean[..., 2:] + stds * rng.standard_normal((copies, 4, 1))
         observation = np.where(rng.random(seen.shape) < 0.1, np.nan, seen)
-        step = update(mean, covariance, observation, model.observation_matrix, model.observation_covariance)
+        sensed = AffineObservation(observation, model.observation_matrix, model.observation_covariance)
+        step = update(mean, covariance, sensed)
         mean, covariance = step.mean, step.covariance
         assert np.array_equal(covariance, covariance.mT)
         assert least_scaled_eigenvalue(covariance) > -1e-12

@@ -8,27 +8,36 @@ from probdmp.gaussian.augmented import (
     predict_deviation,
     smooth_deviations,
 )
-from probdmp.gaussian.density import gaussian_log_density
-from probdmp.gaussian.filtering import FilteredSequence, filter_sequence, predict, update
+from probdmp.gaussian.coupling import block_diagonal, couple_systems
+from probdmp.gaussian.density import gaussian_log_density, output_shares
+from probdmp.gaussian.filtering import AffineObservation, FilteredSequence, filter_sequence, predict, update
+from probdmp.gaussian.linearization import Linearization, linearize_extended, linearize_unscented, wrapped
 from probdmp.gaussian.model import GaussianSequence, LinearGaussianModel
 from probdmp.gaussian.sampling import sample_sequences
 from probdmp.gaussian.smoothing import smooth_sequence
 from probdmp.gaussian.static import Belief, StaticUpdate, linear_moments, observe, unit_belief
 
 __all__ = [
+    "AffineObservation",
     "AugmentedUpdate",
     "Belief",
     "Deviation",
     "FilteredSequence",
     "GaussianSequence",
     "LinearGaussianModel",
+    "Linearization",
     "StaticUpdate",
+    "block_diagonal",
+    "couple_systems",
     "filter_sequence",
     "gaussian_log_density",
     "linear_moments",
+    "linearize_extended",
+    "linearize_unscented",
     "no_deviation",
     "observe",
     "observe_deviation",
+    "output_shares",
     "predict",
     "predict_deviation",
     "sample_sequences",
@@ -36,4 +45,5 @@ __all__ = [
     "smooth_sequence",
     "unit_belief",
     "update",
+    "wrapped",
 ]

@@ -1,16 +1,16 @@
 """Linear systems that move on top of a Gaussian that stands still.
 
-    z ~ N(m, P);    d_i[t] = A d_i[t-1] + e_i[t],  d_i[0] = 0,  e_i ~ N(0, Q_i)
-    o_i[t] = G_i[t] z + c d_i[t] + v_i[t],  v_i ~ N(0, R_i)                  for each of the sensors i, independent but for z
+    z ~ N(m, P);    d_g[t] = A d_g[t-1] + e_g[t],  d_g[0] = 0,  e_g ~ N(0, Q_g)
+    o_g[t] = G_g[t] z + C_g d_g[t] + v_g[t],  v_g ~ N(0, R_g)            for each of the groups g, independent but for z
 
-Given z, every d_i has a Kalman filter of its own, with a gain K that does not depend on z. So its mean is affine in z,
+Given z, every d_g has a Kalman filter of its own, with a gain K that does not depend on z. So its mean is affine in z,
 
-    d_i | z, o  ~  N(a + L z, V),    predict:  a <- A a,  L <- A L,  V <- A V A^T + Q
+    d_g | z, o  ~  N(a + L z, V),    predict:  a <- A a,  L <- A L,  V <- A V A^T + Q
 
-and an innovation, (o - c a) - (G + c L) z, is an observation of z with variance S = c V c^T + R that owes nothing to those
+and an innovation, (o - C a) - (G + C L) z, is an observation of z with covariance S = C V C^T + R that owes nothing to those
 before it: z is conditioned as in `probdmp.gaussian.static`, with all innovation covariances and likelihoods. Then
 
-    update:  a <- a + K (o - c a),    L <- L - K (G + c L),    V <- (I - K c) V (I - K c)^T + K R K^T
+    update:  a <- a + K (o - C a),    L <- L - K (G + C L),    V <- (I - K C) V (I - K C)^T + K R K^T
 
 Source: Rosenberg, Random coefficient models, Annals of Economic and Social Measurement 2 (1973); de Jong, The diffuse Kalman
 filter, Annals of Statistics 19 (1991).
@@ -21,7 +21,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from probdmp.checks import FloatArray
+from probdmp.checks import BoolArray, FloatArray
+from probdmp.gaussian.coupling import block_diagonal
+from probdmp.gaussian.density import invert_covariance
 from probdmp.gaussian.static import Belief, StaticUpdate, observe
 
 __all__ = ["AugmentedUpdate", "Deviation", "no_deviation", "observe_deviation", "predict_deviation", "smooth_deviations"]
@@ -31,25 +33,25 @@ class Deviation(NamedTuple):
     """The states d as functions of z: d = offset + loading z + N(0, covariance)."""
 
     offset: FloatArray
-    """a, (*batch, O, n)."""
+    """a, (*batch, G, n)."""
     loading: FloatArray
-    """L, (*batch, O, n, r)."""
+    """L, (*batch, G, n, r)."""
     covariance: FloatArray
-    """V, (*batch, O, n, n)."""
+    """V, (*batch, G, n, n)."""
 
 
 class AugmentedUpdate(NamedTuple):
     """What is known after an observation, and what the smoother needs of it."""
 
     seen: StaticUpdate
-    """What it said of z; innovations and their covariance are those of the observation given the past."""
+    """What it said of z; innovations (*batch, G S) and their covariance are those of the observation given the past."""
     deviation: Deviation
     scores: FloatArray
-    """c^T S^-1 (o - c a, G + c L), (*batch, O, n, 1 + r); 0 where not seen."""
+    """C^T S^-1 (o - C a, G + C L), (*batch, G, n, 1 + r); 0 where not seen."""
     informations: FloatArray
-    """c^T S^-1 c, (*batch, O, n, n)."""
+    """C^T S^-1 C, (*batch, G, n, n)."""
     retentions: FloatArray
-    """I - K c, (*batch, O, n, n)."""
+    """I - K C, (*batch, G, n, n)."""
 
 
 def no_deviation(batch: tuple[int, ...], n_states: int, size: int) -> Deviation:
@@ -57,7 +59,7 @@ def no_deviation(batch: tuple[int, ...], n_states: int, size: int) -> Deviation:
 
     Parameters
     ----------
-    batch : (*batch, O).
+    batch : (*batch, G).
     size : r.
     """
     return Deviation(np.zeros((*batch, n_states)), np.zeros((*batch, n_states, size)), np.zeros((*batch, n_states, n_states)))
@@ -68,8 +70,8 @@ def predict_deviation(deviation: Deviation, transition: FloatArray, noise: Float
 
     Parameters
     ----------
-    transition : A, (*batch, O, n, n); batch axes may be of length 1.
-    noise : Q, (*batch, O, n, n).
+    transition : A, (*batch, G, n, n); batch axes may be of length 1.
+    noise : Q, (*batch, G, n, n).
     """
     return Deviation(
         np.matmul(transition, deviation.offset[..., None])[..., 0],
@@ -79,32 +81,45 @@ def predict_deviation(deviation: Deviation, transition: FloatArray, noise: Float
 
 
 def observe_deviation(
-    belief: Belief, deviation: Deviation, observation: FloatArray, design: FloatArray, sensor: int, variances: FloatArray
+    belief: Belief,
+    deviation: Deviation,
+    observation: FloatArray,
+    design: FloatArray,
+    sensors: FloatArray,
+    noise: FloatArray,
+    believed: BoolArray | bool = True,
 ) -> AugmentedUpdate:
     """Take one observation into account.
 
     Parameters
     ----------
-    observation : o, (*batch, O), less what is known of it; NaN marks a sensor that was not seen.
-    design : G, (*batch, O, r).
-    sensor : which of the states d is measured: c is a unit vector.
-    variances : R, (*batch, O), > 0.
+    observation : o, (*batch, G, S), less what is known of it; NaN marks a sensor that was not seen.
+    design : G, (*batch, G, S, r).
+    sensors : C, (*batch, G, S, n); batch axes may be of length 1.
+    noise : R, (*batch, G, S, S), positive definite; likewise.
+    believed : (*batch, G, S): see `probdmp.gaussian.static.observe`.
     """
     offset, loading, covariance = deviation
-    errors, designs = observation - offset[..., sensor], design + loading[..., sensor, :]
-    spread = covariance[..., sensor]
-    total = spread[..., sensor] + variances
-    weight = np.where(np.isnan(observation), 0.0, 1 / total)
-    gain = spread * weight[..., None]
-    unit = np.eye(offset.shape[-1])[sensor]
-    retention = np.eye(offset.shape[-1]) - gain[..., :, None] * unit
-    both = np.concatenate([np.where(np.isnan(errors), 0.0, errors)[..., None], designs], axis=-1)
-    updated = retention @ covariance @ retention.mT + gain[..., :, None] * gain[..., None, :] * variances[..., None, None]
+    (n_groups, size), n_states = observation.shape[-2:], offset.shape[-1]
+    seen = ~np.isnan(observation) & believed
+    errors = observation - np.matmul(sensors, offset[..., None])[..., 0]
+    designs = design + sensors @ loading
+    total = sensors @ covariance @ sensors.mT + noise
+    # A sensor that was not seen has a unit variance and no weight.
+    known = np.where(seen[..., :, None] & seen[..., None, :], total, np.eye(size))
+    weighted = np.where(seen[..., None], sensors, 0.0).mT @ invert_covariance(known)[0]  # C^T S^-1
+    gain = covariance @ weighted
+    retention = np.eye(n_states) - gain @ sensors
+    both = np.concatenate([np.where(seen, errors, 0.0)[..., None], designs], axis=-1)
+    moved = gain @ both
+    updated = retention @ covariance @ retention.mT + gain @ noise @ gain.mT
+    flat = (*observation.shape[:-2], n_groups * size)
+    independent = block_diagonal(np.broadcast_to(total, (*observation.shape, size)))
     return AugmentedUpdate(
-        observe(belief, errors, designs, total),
-        Deviation(offset + gain * both[..., :1], loading - gain[..., :, None] * designs[..., None, :], updated),
-        unit[:, None] * (weight[..., None] * both)[..., None, :],
-        weight[..., None, None] * np.outer(unit, unit),
+        observe(belief, errors.reshape(flat), designs.reshape(*flat, -1), independent, seen.reshape(flat)),
+        Deviation(offset + moved[..., 0], loading - moved[..., 1:], updated),
+        weighted @ both,
+        weighted @ sensors,
         retention,
     )
 

@@ -5,19 +5,38 @@
               m = m- + K e,  V = (I - K C) V- (I - K C)^T + K R K^T           (Joseph form)
     likelihood of a step: ln N(o; C m-, S), the density of the PREDICTION, never of the update
 
-The same `predict` and `update` serve the recorded and the online case; a rollout is the loop with nothing observed.
+The same `predict` and `update` serve the recorded and the online case; a rollout is the loop with nothing observed. Where C and
+R depend on where the state is believed to be, as those of a linearised sensor do, a function says what they are at each step.
 Source: Meier & Schaal 2016, Algorithms 1 and 2; Bishop, Pattern Recognition and Machine Learning, section 13.3.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
-from probdmp.checks import FloatArray
+from probdmp.checks import BoolArray, FloatArray
 from probdmp.gaussian.density import gaussian_log_density, invert_covariance
 from probdmp.gaussian.model import GaussianSequence, LinearGaussianModel
 
-__all__ = ["FilteredSequence", "Update", "filter_sequence", "predict", "update"]
+__all__ = ["AffineObservation", "FilteredSequence", "Update", "filter_sequence", "predict", "update"]
+
+
+class AffineObservation(NamedTuple):
+    """What was seen, as a linear function of the state with noise."""
+
+    values: FloatArray
+    """o, (*batch, O); NaN where nothing was seen."""
+    matrix: FloatArray
+    """C, (*batch, O, n)."""
+    covariance: FloatArray
+    """R, (*batch, O, O), positive definite."""
+    believed: BoolArray | bool = True
+    """(*batch, O): what is not is compared with what was expected, and then treated as if it had not been seen."""
+
+
+Look = Callable[[FloatArray, FloatArray, FloatArray], AffineObservation]
+"""From the predicted mean and covariance of the state, and the raw observation, to what that says of the state."""
 
 
 class Update(NamedTuple):
@@ -31,6 +50,8 @@ class Update(NamedTuple):
     """e, (*batch, O); NaN where not seen."""
     innovation_covariance: FloatArray
     """S, (*batch, O, O), whether seen or not."""
+    fused: BoolArray
+    """(*batch, O): what was seen and believed."""
     score: FloatArray
     """C^T S^-1 e, (*batch, n): the gradient of the log-likelihood with respect to m-."""
     information: FloatArray
@@ -38,7 +59,7 @@ class Update(NamedTuple):
     retention: FloatArray
     """I - K C, (*batch, n, n): what the update leaves of an error in m-."""
     log_likelihood: FloatArray
-    """ln N(o; C m-, S) over the sensors that were seen, (*batch); 0 where none was."""
+    """ln N(o; C m-, S) over what was seen and believed, (*batch); 0 where nothing was."""
 
 
 class FilteredSequence(NamedTuple):
@@ -50,6 +71,8 @@ class FilteredSequence(NamedTuple):
     """(T, *batch, O) array; NaN where not seen."""
     innovation_covariances: FloatArray
     """(T, *batch, O, O) array."""
+    fused: BoolArray
+    """(T, *batch, O) array: what was seen and believed."""
     log_likelihoods: FloatArray
     """(T, *batch) array, nats: density of what was seen at each time given the past."""
     scores: FloatArray
@@ -80,26 +103,17 @@ def predict(
     return np.matmul(transition, mean[..., None])[..., 0] + drift, transition @ covariance @ transition.mT + process_covariance
 
 
-def update(
-    mean: FloatArray,
-    covariance: FloatArray,
-    observation: FloatArray,
-    observation_matrix: FloatArray,
-    observation_covariance: FloatArray,
-) -> Update:
-    """Take one observation into account.
+def update(mean: FloatArray, covariance: FloatArray, observation: AffineObservation) -> Update:
+    """Take one observation into account; for the sake of what was not seen, or is not believed, nothing changes.
 
     Parameters
     ----------
     mean, covariance : (*batch, n) and (*batch, n, n) arrays, the predicted state.
-    observation : (*batch, O) array; NaN marks a sensor that was not seen, and nothing changes for its sake.
-    observation_matrix : C, (*batch, O, n).
-    observation_covariance : R, (*batch, O, O).
     """
-    seen = ~np.isnan(observation)
-    innovation = observation - np.matmul(observation_matrix, mean[..., None])[..., 0]
-    innovation_covariance = observation_matrix @ covariance @ observation_matrix.mT + observation_covariance  # Alg. 2, l. 5
-    c, r, s = observation_matrix, observation_covariance, innovation_covariance
+    values, c, r, believed = observation
+    seen = ~np.isnan(values) & believed
+    innovation = values - np.matmul(c, mean[..., None])[..., 0]
+    s = innovation_covariance = c @ covariance @ c.mT + r  # Alg. 2, line 5
     if not seen.all():
         # A sensor that was not seen gets a zero row in C and a unit variance: no gain, no density.
         both, identity = seen[..., :, None] & seen[..., None, :], np.eye(seen.shape[-1])
@@ -115,6 +129,7 @@ def update(
         (updated + updated.mT) / 2,
         innovation,
         innovation_covariance,
+        seen,
         np.matmul(weighted, residual[..., None])[..., 0],
         weighted @ c,
         retention,
@@ -122,12 +137,16 @@ def update(
     )
 
 
-def filter_sequence(model: LinearGaussianModel, observations: FloatArray | None = None) -> FilteredSequence:
+def filter_sequence(
+    model: LinearGaussianModel, observations: FloatArray | None = None, look: Look | None = None
+) -> FilteredSequence:
     """Kalman filter over a recording; without observations, a rollout with its uncertainty.
 
     Parameters
     ----------
     observations : (T, *batch, O) array; NaN marks what was not seen. None: nothing was seen at all.
+    look : what an observation says of the state; unless given, what C and R of the model say. With it the innovations of
+        `FilteredSequence` are those of what it returns.
 
     Raises
     ------
@@ -143,7 +162,11 @@ def filter_sequence(model: LinearGaussianModel, observations: FloatArray | None 
     for t in range(model.n_steps):
         if t > 0:  # u[t-1] drives s[t-1] to s[t]
             mean, covariance = predict(mean, covariance, model.transition, drifts[t - 1], process_covariances[t - 1])
-        step = update(mean, covariance, observed[t], model.observation_matrix, model.observation_covariance)
+        if look is None:
+            seen = AffineObservation(observed[t], model.observation_matrix, model.observation_covariance)
+        else:
+            seen = look(mean, covariance, observed[t])
+        step = update(mean, covariance, seen)
         mean, covariance = step.mean, step.covariance
         steps.append(step)
     stacked = Update(*(np.stack(column) for column in zip(*steps, strict=True)))
@@ -151,6 +174,7 @@ def filter_sequence(model: LinearGaussianModel, observations: FloatArray | None 
         GaussianSequence(stacked.mean, stacked.covariance),
         stacked.innovation,
         stacked.innovation_covariance,
+        stacked.fused,
         stacked.log_likelihood,
         stacked.score,
         stacked.information,
