@@ -1,12 +1,21 @@
-"""Random systems and primitives for tests of laws."""
+"""Random systems, primitives and sensors for tests of laws."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 from hypothesis import strategies as st
 from reference import system_at
 
-from probdmp.dmp import Configuration, Primitive, linear_gaussian_model, step_count, task_for
+from probdmp.dmp import (
+    ChannelVariation,
+    Configuration,
+    Primitive,
+    Variation,
+    linear_gaussian_model,
+    step_count,
+    task_for,
+)
+from probdmp.execution import LinearSensor, roll_out
 from probdmp.gaussian import LinearGaussianModel, sample_sequences
 
 BATCH_SHAPES = ((), (2,), (2, 3))
@@ -127,6 +136,65 @@ def make_primitive(rng, n_dof=2, n_basis=8, **changes):
         "units": "m",
     }
     return Primitive(configuration=configuration, **(values | changes))
+
+
+def make_joint_primitive(rng, n_dof=2, n_basis=4, channels=(), rank=None, **changes):
+    """A random primitive with joint weights: one Gaussian over the parameters of all signals, each about one unit.
+
+    channels : names of sensor channels.
+    rank : of the covariance, full unless given; the lower, the more signals vary together.
+    changes : as for `make_primitive`.
+    """
+    p = make_primitive(rng, n_dof, n_basis, **({"weight_uncertainty": "joint"} | changes))
+    stiffness, n_channels = p.configuration.stiffness, len(channels)
+    weights = [0.1 * stiffness] * n_basis
+    scale = np.concatenate([np.tile([1.0, 0.3, *weights], n_dof), np.tile([0.2, 1.0, 0.3, *weights], n_channels)])
+    covariance = random_covariance(rng, (), len(scale), rank or len(scale)) * scale * scale[:, None]
+    theta = slice(0, n_dof * (n_basis + 2))
+    means = np.column_stack([p.start_velocities, p.goal - p.start, p.weight_means])
+    varied = replace(p, variation=Variation(means, covariance[theta, theta], np.full(n_dof, 1e-6)))
+    if not channels:
+        return varied
+    rest, ones = slice(theta.stop, None), np.ones(n_channels)
+    unit = np.array([1.0, 1.0, 0.5, *[stiffness] * n_basis])
+    of_channels = ChannelVariation(
+        names=channels,
+        means=rng.standard_normal((n_channels, n_basis + 3)) * unit,
+        covariance=covariance[rest, rest],
+        cross_covariance=covariance[rest, theta],
+        residual_variances=1e-4 * ones,
+        observation_variances=1e-3 * ones,
+        forcing_precisions=(0.1 * stiffness) ** -2 * ones,
+        ranges=ones,
+    )
+    return replace(varied, channels=of_channels)
+
+
+def state_scales(primitive, dt):
+    """(3 D,) standard deviations of the states of executions at their largest, for sensors that say as much as is known."""
+    stds = np.sqrt(np.diagonal(roll_out(primitive, task_for(primitive), dt).covariances, axis1=-2, axis2=-1)).max(axis=0)
+    return np.maximum(stds, 1e-3).ravel()
+
+
+def random_sensors(rng, primitive, dt, n_sensors, coupling=False, gate=None):
+    """Linear sensors of 1 to 3 outputs, mixtures of position, velocity and acceleration with a full R, about as noisy as what
+    they measure is uncertain or a tenth of that.
+
+    coupling : True: each output sees all degrees of freedom; False: one, which all outputs of its sensor see; "noise": one,
+        another one than the next output of the sensor, with which it shares noise.
+    """
+    scales, sensors = state_scales(primitive, dt), []
+    for i in range(n_sensors):
+        n_outputs = int(rng.integers(2 if coupling == "noise" else 1, 4))
+        matrix = rng.standard_normal((n_outputs, primitive.n_dof, 3)) * (rng.random((n_outputs, primitive.n_dof, 3)) < 0.7)
+        matrix[..., 2] += ~matrix.any(axis=-1)
+        if coupling is not True:
+            owners = np.arange(n_outputs) * (coupling == "noise") + rng.integers(primitive.n_dof)
+            matrix *= (np.arange(primitive.n_dof) == owners[:, None] % primitive.n_dof)[..., None]
+        matrix = matrix.reshape(n_outputs, -1)
+        noise = random_covariance(rng, (), n_outputs, n_outputs) + 0.1 * np.eye(n_outputs)
+        sensors.append(LinearSensor(f"s{i}", matrix / scales, noise * 10 ** rng.uniform(-2, 0), gate=gate))
+    return sensors
 
 
 @st.composite

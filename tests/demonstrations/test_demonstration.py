@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from probdmp.demonstrations import Demonstration, as_demonstrations, stack_positions
+from probdmp.demonstrations import Demonstration, as_demonstrations, signals_of, stack_signals
 from probdmp.errors import InputError, InputTypeError
 
 POSITIONS = np.arange(10.0).reshape(5, 2)
@@ -248,8 +248,27 @@ def test_what_is_no_set_of_demonstrations(data, dt, error, match):
 
 def test_recordings_side_by_side_end_in_nan():
     short, long = Demonstration(POSITIONS[:3], 0.1), Demonstration(POSITIONS, 0.1)
-    stacked = stack_positions([short, long])
+    stacked = stack_signals([short, long])
     assert stacked.shape == (5, 2, 2)
     np.testing.assert_array_equal(stacked[:, 1], POSITIONS)
     np.testing.assert_array_equal(stacked[:3, 0], POSITIONS[:3])
     assert np.isnan(stacked[3:, 0]).all()
+
+
+def test_signals_are_positions_then_channels_in_the_order_asked_for():
+    felt = Demonstration(POSITIONS, 0.1, channels={"force": np.arange(5.0), "heat": np.ones(5)})
+    np.testing.assert_array_equal(signals_of(felt), POSITIONS)
+    np.testing.assert_array_equal(signals_of(felt, ["heat", "force"]), np.column_stack([POSITIONS, np.ones(5), np.arange(5.0)]))
+    stacked = stack_signals([felt, Demonstration(POSITIONS[:3], 0.1, channels={"force": [1.0, np.nan, 3.0]})], ["force"])
+    assert stacked.shape == (5, 2, 3)
+    np.testing.assert_array_equal(stacked[:, 1, 2], [1, np.nan, 3, np.nan, np.nan])
+
+
+def test_channels_that_are_not_there_or_say_nothing():
+    felt = Demonstration(POSITIONS, 0.1, channels={"force": np.arange(5.0), "mute": np.full(5, np.nan)})
+    with pytest.raises(InputError, match=r"demonstrations with the channels 'force', 'heat', got one with 'force', 'mute'"):
+        signals_of(felt, ["force", "heat"])
+    with pytest.raises(InputError, match=r"demonstrations with the channels 'heat', got one with none"):
+        signals_of(Demonstration(POSITIONS, 0.1), ["heat"])
+    with pytest.raises(InputError, match=r"channel 'mute' measured in every demonstration, got one without a single sample"):
+        signals_of(felt, ["mute"])

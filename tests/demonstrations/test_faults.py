@@ -333,8 +333,8 @@ def test_a_size_follows_a_colon(letter):
 @pytest.mark.parametrize(
     ("name", "match"),
     [
-        ("fire", "fault to be one of 'hold', .*'spikes', got 'fire'"),
-        ("hold:0.3", "fault 'hold' without a size, got 'hold:0.3'. Only push, drift, wrong_goal have one"),
+        ("fire", "fault to be one of 'hold', .*'spikes', 'lift', 'press', 'wrong_channel', got 'fire'"),
+        ("hold:0.3", "fault 'hold' without a size, got 'hold:0.3'. Only push, drift, wrong_goal, press have one"),
         ("push:", "size of a fault as a fraction of the range above 0, such as push:0.25, got 'push:'"),
         ("push:big", "size of a fault"),
         ("push:-1", "size of a fault"),

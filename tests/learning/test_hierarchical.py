@@ -76,13 +76,15 @@ def test_a_population_is_recovered(scheme):
     ranges = np.ptp(paths, axis=1).mean(axis=0)
     found = estimate_variation(responses, paths, ranges)
     stds = paths.std(axis=0, ddof=1)
-    assert np.abs(responses @ found.means.T - paths.mean(axis=0)).max() < 0.02 * stds.max()
-    both = np.kron(np.eye(2), responses)
+    theta_rows = np.column_stack([np.ones(m), responses])  # of the parameters, of which the start is the first
+    assert np.abs(theta_rows @ found.means.T - paths.mean(axis=0)).max() < 0.02 * stds.max()
+    both = np.kron(np.eye(2), theta_rows)
     got, wanted = both @ found.covariance @ both.T, np.cov(paths.transpose(0, 2, 1).reshape(400, -1), rowvar=False)
     prior = got - 0.5 * wanted  # the other half, of the same size along the path as a whole
     assert np.linalg.eigvalsh(prior)[0] > -0.02 * np.trace(got)
     np.testing.assert_allclose(np.trace(got), np.trace(wanted), rtol=0.2)
-    np.testing.assert_allclose(found.residual_variances, 1e-6, rtol=0.3, atol=(1.2e-4 * ranges.max()) ** 2)
+    np.testing.assert_array_equal(found.means[:, 0], 0)  # movements are seen from their start
+    np.testing.assert_allclose(found.residuals, 1e-6, rtol=0.3, atol=(1.2e-4 * ranges.max()) ** 2)
 
 
 def test_the_goal_is_where_demonstrations_end(letters, learned):

@@ -1,19 +1,28 @@
 """Recorded movement as checked data, the built-in letters and arm movements, and faults to inject."""
 
 from probdmp.demonstrations.arm_movements import ARM_MOVEMENTS, ArmMovement, ArmVariation, synthetic_arm_movements
-from probdmp.demonstrations.demonstration import Demonstration, Recording, Recordings, as_demonstrations, stack_positions
-from probdmp.demonstrations.extent import largest_extent, mean_ranges
-from probdmp.demonstrations.faults import BENIGN, FAILURE, FAULTS, SENSOR, Fault, fault_named
+from probdmp.demonstrations.contacts import Contact, ContactVariation, synthetic_contacts
+from probdmp.demonstrations.demonstration import (
+    Demonstration,
+    Recording,
+    Recordings,
+    as_demonstrations,
+    signals_of,
+    stack_signals,
+)
+from probdmp.demonstrations.extent import channel_ranges, largest_extent, mean_ranges
+from probdmp.demonstrations.faults import BENIGN, CHANNEL_FAULTS, FAILURE, FAULTS, SENSOR, Fault, fault_named
 from probdmp.demonstrations.letters import LETTERS, WriterVariation, WrittenLetter, synthetic_letters, written_letters
 from probdmp.demonstrations.movement_faults import hold
 from probdmp.demonstrations.perturbation import ONSETS, fault_generator, perturb_executions
-from probdmp.demonstrations.resampling import demonstration_from_times, positions_on_phases
+from probdmp.demonstrations.resampling import channel_from_times, demonstration_from_times, signals_on_phases
 from probdmp.demonstrations.sigma_lognormal import Strokes
 from probdmp.demonstrations.smoothing import SmoothPath, noise_stds, smooth_path, without_noise
 
 __all__ = [
     "ARM_MOVEMENTS",
     "BENIGN",
+    "CHANNEL_FAULTS",
     "FAILURE",
     "FAULTS",
     "LETTERS",
@@ -21,6 +30,8 @@ __all__ = [
     "SENSOR",
     "ArmMovement",
     "ArmVariation",
+    "Contact",
+    "ContactVariation",
     "Demonstration",
     "Fault",
     "Recording",
@@ -30,6 +41,8 @@ __all__ = [
     "WriterVariation",
     "WrittenLetter",
     "as_demonstrations",
+    "channel_from_times",
+    "channel_ranges",
     "demonstration_from_times",
     "fault_generator",
     "fault_named",
@@ -38,10 +51,12 @@ __all__ = [
     "mean_ranges",
     "noise_stds",
     "perturb_executions",
-    "positions_on_phases",
+    "signals_of",
+    "signals_on_phases",
     "smooth_path",
-    "stack_positions",
+    "stack_signals",
     "synthetic_arm_movements",
+    "synthetic_contacts",
     "synthetic_letters",
     "without_noise",
     "written_letters",

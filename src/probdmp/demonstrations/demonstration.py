@@ -19,7 +19,8 @@ __all__ = [
     "Recording",
     "Recordings",
     "as_demonstrations",
-    "stack_positions",
+    "signals_of",
+    "stack_signals",
 ]
 
 SHORTEST_RECORDING = 3
@@ -180,10 +181,29 @@ def _as_demonstration(item: Recording, k: int, dt: float | None) -> Demonstratio
     return Demonstration(check_array(item, f"demonstration {k}", ("T", "D"), missing=True), dt)
 
 
-def stack_positions(demonstrations: Sequence[Demonstration]) -> FloatArray:
-    """Recordings side by side, (T, K, D) array; the shorter ones end in NaN, as if nothing more was measured."""
-    longest = max(d.n_samples for d in demonstrations)
-    stacked = np.full((longest, len(demonstrations), demonstrations[0].n_dof), np.nan)
-    for k, demonstration in enumerate(demonstrations):
-        stacked[: demonstration.n_samples, k] = demonstration.positions
+def signals_of(demonstration: Demonstration, channels: Sequence[str] = ()) -> FloatArray:
+    """Positions, then channels by name, (T, S) array; NaN where a sample is missing.
+
+    Raises
+    ------
+    InputError
+        If it has no such channel, or one of which nothing was measured.
+    """
+    missing = [name for name in channels if name not in demonstration.channels]
+    if missing:
+        present = ", ".join(map(repr, demonstration.channels)) or "none"
+        raise InputError(f"demonstrations with the channels {', '.join(map(repr, channels))}", f"one with {present}")
+    columns = [demonstration.channels[name] for name in channels]
+    for name, column in zip(channels, columns, strict=True):
+        if np.isnan(column).all():
+            raise InputError(f"channel {name!r} measured in every demonstration", "one without a single sample of it")
+    return np.column_stack([demonstration.positions, *columns])
+
+
+def stack_signals(demonstrations: Sequence[Demonstration], channels: Sequence[str] = ()) -> FloatArray:
+    """Recordings side by side, (T, K, S) array; the shorter ones end in NaN, as if nothing more was measured."""
+    tables = [signals_of(demonstration, channels) for demonstration in demonstrations]
+    stacked = np.full((max(map(len, tables)), len(tables), tables[0].shape[1]), np.nan)
+    for k, table in enumerate(tables):
+        stacked[: len(table), k] = table
     return stacked

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from probdmp.checks import FloatArray
-from probdmp.demonstrations.demonstration import Demonstration
+from probdmp.demonstrations.demonstration import Demonstration, signals_of
 from probdmp.errors import InputError
 
-__all__ = ["largest_extent", "mean_ranges"]
+__all__ = ["channel_ranges", "largest_extent", "mean_ranges"]
 
 RANGES = (1e-40, 1e40)
 """Least and largest, data units: precisions and variances must stay finite."""
@@ -34,6 +34,22 @@ def mean_ranges(demonstrations: Sequence[Demonstration]) -> FloatArray:
         got = f"from {ranges.min():g} to {ranges.max():g}"
         raise InputError(f"movement over {RANGES[0]:g} to {RANGES[1]:g} units", got, "Rescale the data, to metres say.")
     return np.asarray(ranges)
+
+
+def channel_ranges(demonstrations: Sequence[Demonstration], channels: Sequence[str]) -> FloatArray:
+    """Mean extent of sensor channels over the demonstrations, (F,) array, > 0; each in its own unit.
+
+    One that never changes takes its distance from zero, or 1.
+    """
+    found = []
+    for name in channels:
+        columns = [signals_of(d, [name])[:, -1] for d in demonstrations]
+        extent = float(np.mean([np.nanmax(c) - np.nanmin(c) for c in columns]))
+        magnitude = float(max(np.nanmax(np.abs(c)) for c in columns))
+        found.append(extent if extent > STILL * magnitude else magnitude or 1.0)
+        if not RANGES[0] <= found[-1] <= RANGES[1]:
+            raise InputError(f"channel {name!r} over {RANGES[0]:g} to {RANGES[1]:g} units", f"{found[-1]:g}", "Rescale it.")
+    return np.array(found, dtype=np.float64)
 
 
 def largest_extent(positions: FloatArray) -> float:

@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from probdmp.checks import FloatArray, check_choice
+from probdmp.demonstrations.channel_faults import lift, press, wrong_channel
 from probdmp.demonstrations.movement_faults import drift, hold, hold_release, push, slow, wrong_class, wrong_goal
 from probdmp.demonstrations.sensor_faults import dropout, jitter, spikes, stuck_sensor
 from probdmp.errors import InputError, TooFewDemonstrationsError
 
-__all__ = ["BENIGN", "FAILURE", "FAULTS", "SENSOR", "Fault", "fault_named"]
+__all__ = ["BENIGN", "CHANNEL_FAULTS", "FAILURE", "FAULTS", "SENSOR", "Fault", "fault_named"]
 
 FAILURE = "failure"
 """To be called failed."""
@@ -34,6 +35,10 @@ class Fault:
     """Fraction of the range; None for faults without a size."""
     takes_others: bool = False
     """Whether it needs executions of other movements. Such a fault is there from the first sample on."""
+    of_channels: bool = False
+    """Whether it is the sensor channels that it changes, and not the positions."""
+    takes_channels_along: bool = False
+    """Whether it does to the sensor channels what it does to the positions; otherwise they stay as they are."""
 
     @property
     def kind(self) -> str:
@@ -47,7 +52,7 @@ class Fault:
 
         Parameters
         ----------
-        positions : (T, D) array, data units; NaN where a sample is missing.
+        positions : (T, D) array, data units; NaN where a sample is missing. Of a fault of channels, these: (T, F).
         onset : first sample with the fault, 1 to T - 1.
         others : executions of other movements, (T', D) arrays at the same rate.
 
@@ -74,20 +79,29 @@ class Fault:
 FAULTS: dict[str, Fault] = {
     fault.name: fault
     for fault in (
-        Fault("hold", hold),
-        Fault("hold_release", hold_release),
-        Fault("slow", slow),
+        Fault("hold", hold, takes_channels_along=True),
+        Fault("hold_release", hold_release, takes_channels_along=True),
+        Fault("slow", slow, takes_channels_along=True),
         Fault("push", push, size=0.25),
         Fault("drift", drift, size=0.3),
         Fault("wrong_goal", wrong_goal, size=0.3),
-        Fault("wrong_class", wrong_class, takes_others=True),
+        Fault("wrong_class", wrong_class, takes_others=True, takes_channels_along=True),
         Fault("dropout", dropout, BENIGN),
-        Fault("jitter", jitter, BENIGN),
+        Fault("jitter", jitter, BENIGN, takes_channels_along=True),
         Fault("stuck_sensor", stuck_sensor, SENSOR),
         Fault("spikes", spikes, SENSOR),
     )
 }
 """By name."""
+CHANNEL_FAULTS: dict[str, Fault] = {
+    fault.name: fault
+    for fault in (
+        Fault("lift", lift, of_channels=True),
+        Fault("press", press, size=0.4, of_channels=True),
+        Fault("wrong_channel", wrong_channel, takes_others=True, of_channels=True),
+    )
+}
+"""By name: of executions with sensor channels."""
 
 
 def fault_named(name: str) -> Fault:
@@ -99,11 +113,12 @@ def fault_named(name: str) -> Fault:
         If there is no such fault, it has no size, or the size is no number above 0.
     """
     kind, colon, text = str(name).partition(":")
-    fault = FAULTS[check_choice(kind, "fault", FAULTS)]
+    known = FAULTS | CHANNEL_FAULTS
+    fault = known[check_choice(kind, "fault", known)]
     if not colon:
         return fault
     if fault.size is None:
-        sized = ", ".join(known.name for known in FAULTS.values() if known.size is not None)
+        sized = ", ".join(other.name for other in known.values() if other.size is not None)
         raise InputError(f"fault {kind!r} without a size", repr(name), f"Only {sized} have one.")
     try:
         size = float(text)

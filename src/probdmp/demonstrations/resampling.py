@@ -1,16 +1,17 @@
 """From recordings with their own clock to the constant rate that everything else assumes, and to common phases."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from probdmp.checks import FloatArray, check_array, check_seconds, shape_text
 from probdmp.demonstrations.clock import sampled_on_grid
-from probdmp.demonstrations.demonstration import LONGEST_RECORDING, Demonstration
+from probdmp.demonstrations.demonstration import LONGEST_RECORDING, Demonstration, signals_of
 from probdmp.errors import InputError
 
-__all__ = ["CLOCK_TOLERANCE", "demonstration_from_times", "positions_on_phases"]
+__all__ = ["CLOCK_TOLERANCE", "channel_from_times", "demonstration_from_times", "signals_on_phases"]
 
 CLOCK_TOLERANCE = 1e-3
 """Fraction of a step by which the last time may miss a sample."""
@@ -60,18 +61,51 @@ def demonstration_from_times(
     return Demonstration(sampled_on_grid(since, path, grid), step, label, names, units)
 
 
-def positions_on_phases(demonstrations: Sequence[Demonstration], n_phases: int) -> FloatArray:
-    """Positions at n_phases times evenly spaced from first to last sample, along straight lines over what was measured.
+def signals_on_phases(demonstrations: Sequence[Demonstration], n_phases: int, channels: Sequence[str] = ()) -> FloatArray:
+    """Positions and channels at n_phases times evenly spaced from first to last sample, along straight lines over what was
+    measured.
 
     Returns
     -------
-    (K, n_phases, D) array, data units.
+    (K, n_phases, S) array, units of each signal.
     """
     phases = np.linspace(0.0, 1.0, n_phases)
-    paths = np.empty((len(demonstrations), n_phases, demonstrations[0].n_dof))
-    for path, demonstration in zip(paths, demonstrations, strict=True):
-        own = np.linspace(0.0, 1.0, demonstration.n_samples)
-        for d, column in enumerate(demonstration.positions.T):
+    tables = [signals_of(demonstration, channels) for demonstration in demonstrations]
+    paths = np.empty((len(tables), n_phases, tables[0].shape[1]))
+    for path, table in zip(paths, tables, strict=True):
+        own = np.linspace(0.0, 1.0, len(table))
+        for d, column in enumerate(table.T):
             seen = ~np.isnan(column)
             path[:, d] = np.interp(phases, own[seen], column[seen])
     return paths
+
+
+def channel_from_times(demonstration: Demonstration, name: str, times: ArrayLike, values: ArrayLike) -> Demonstration:
+    """The demonstration with one more channel, of a sensor with a clock of its own: each reading at the sample nearest to it.
+
+    Parameters
+    ----------
+    times : (n,) array, seconds from the first sample of the demonstration.
+    values : (n,) array, or (n, O) for outputs name_0, name_1, …. At samples without a reading the channel is NaN.
+
+    Raises
+    ------
+    InputError
+        If two readings fall on one sample, or one outside of the recording.
+    """
+    clock = check_array(times, "times", ("n",))
+    table = check_array(
+        values, f"values of {name!r:.50}", (len(clock), "O") if np.ndim(values) > 1 else (len(clock),), missing=True
+    )
+    table = table if table.ndim > 1 else table[:, None]
+    places = np.round(clock / demonstration.dt).astype(np.int64)
+    if len(places) and not 0 <= places.min() <= places.max() < demonstration.n_samples:
+        hint = f"The recording lasts {demonstration.duration:g} s. Do both clocks begin together?"
+        raise InputError("readings within the recording", f"some from {clock.min():g} to {clock.max():g} s", hint)
+    if len(np.unique(places)) < len(places):
+        hint = "Take every second one, say, or resample the demonstration to a smaller dt."
+        raise InputError(f"at most one reading per sample of {demonstration.dt:g} s", "several", hint)
+    columns = np.full((demonstration.n_samples, table.shape[1]), np.nan)
+    columns[places] = table
+    names = [name] if table.shape[1] == 1 else [f"{name}_{i}" for i in range(table.shape[1])]
+    return replace(demonstration, channels={**demonstration.channels, **dict(zip(names, columns.T, strict=True))})

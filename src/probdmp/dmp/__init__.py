@@ -1,5 +1,6 @@
 """The movement primitive: phase, basis, spring-damper system, forcing term, and the linear system they make."""
 
+from probdmp.dmp.channels import ChannelVariation, Signals
 from probdmp.dmp.configuration import PUBLISHED, Configuration
 from probdmp.dmp.path_distribution import path_distribution
 from probdmp.dmp.primitive import Primitive, task_for
@@ -10,9 +11,11 @@ from probdmp.dmp.via_points import ViaPoint, condition_primitive
 
 __all__ = [
     "PUBLISHED",
+    "ChannelVariation",
     "Configuration",
     "PathDistribution",
     "Primitive",
+    "Signals",
     "Task",
     "Variation",
     "ViaPoint",

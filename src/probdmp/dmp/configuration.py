@@ -6,11 +6,12 @@ from probdmp.checks import check_choice, check_count, check_positive
 from probdmp.dmp.transformation_system import DISCRETIZATIONS
 from probdmp.errors import InputError
 
-__all__ = ["FORCING_NOISES", "GOAL_HANDLINGS", "PUBLISHED", "SCALINGS", "WEIGHT_UNCERTAINTIES", "Configuration"]
+__all__ = ["COUPLINGS", "FORCING_NOISES", "GOAL_HANDLINGS", "PUBLISHED", "SCALINGS", "WEIGHT_UNCERTAINTIES", "Configuration"]
 
 SCALINGS = ("none", "paper")
 FORCING_NOISES = ("posterior", "predictive")
 WEIGHT_UNCERTAINTIES = ("independent", "joint")
+COUPLINGS = ("auto", "full", "none")
 GOAL_HANDLINGS = ("blend", "condition", "attractor")
 
 STIFFEST = (1e-3, 1e4)
@@ -36,6 +37,9 @@ class Configuration:
     `"joint"`: the weights are constant and unknown."""
     goal_handling: str = "blend"
     """What a commanded goal does when the weights are `"joint"`; see `probdmp.dmp.goal_handling`."""
+    coupling: str = "full"
+    """Whether the degrees of freedom of an execution, and its channels, are learned to vary together: `"full"`, `"none"`, or
+    `"auto"`, whichever makes demonstrations likelier given the others. Pooled weights never do."""
 
     @property
     def stiffness(self) -> float:
@@ -52,6 +56,7 @@ class Configuration:
         check_choice(self.forcing_noise, "forcing_noise", FORCING_NOISES)
         check_choice(self.weight_uncertainty, "weight_uncertainty", WEIGHT_UNCERTAINTIES)
         check_choice(self.goal_handling, "goal_handling", GOAL_HANDLINGS)
+        check_choice(self.coupling, "coupling", COUPLINGS)
         if (self.scaling, self.weight_uncertainty) == ("paper", "joint"):
             raise InputError(
                 'scaling="none" with weight_uncertainty="joint"',

@@ -17,25 +17,34 @@ import numpy as np
 from probdmp.checks import FloatArray
 from probdmp.dmp.primitive import Primitive
 from probdmp.dmp.transformation_system import DISCRETIZATIONS
+from probdmp.gaussian import block_diagonal
 
 __all__ = ["DeviationSystem", "deviation_system", "lasting_variances"]
 
 
 class DeviationSystem(NamedTuple):
-    """How deviations move; degrees of freedom do so independently."""
+    """How the deviations of all signals move, each independently of the others."""
 
     transition: FloatArray
     """A, (*batch, 1, 3, 3)."""
     input_vector: FloatArray
     """B, (*batch, 1, 3)."""
     variances: FloatArray
-    """Of eps, (*batch, D) array, data units squared."""
+    """Of eps, (*batch, S) array, units of the signal squared."""
 
     @property
     def noise(self) -> FloatArray:
-        """Q = B var(eps) B^T, (*batch, D, 3, 3)."""
+        """Q = B var(eps) B^T, (*batch, S, 3, 3)."""
         b = self.input_vector
         return np.asarray(self.variances[..., None, None] * b[..., :, None] * b[..., None, :])
+
+    def grouped(self, are_coupled: bool) -> tuple[FloatArray, FloatArray]:
+        """A and Q of the groups of states that are filtered together, (*batch, G, n, n): of each signal, or of all at once."""
+        if not are_coupled:
+            return self.transition, self.noise
+        noise = self.noise
+        transition = block_diagonal(np.broadcast_to(self.transition, noise.shape))
+        return transition[..., None, :, :], block_diagonal(noise)[..., None, :, :]
 
 
 def deviation_system(primitive: Primitive, duration: FloatArray, dt: FloatArray) -> DeviationSystem:
@@ -49,17 +58,17 @@ def deviation_system(primitive: Primitive, duration: FloatArray, dt: FloatArray)
     scheme, alpha_z = DISCRETIZATIONS[configuration.discretization], configuration.alpha_z
     system = scheme.step(alpha_z, duration, dt)
     learned = scheme.noise_variance(np.asarray(alpha_z * primitive.phase_step))
-    variances = (scheme.noise_variance(alpha_z * dt / duration) / learned)[..., None] / primitive.forcing_precisions
+    variances = (scheme.noise_variance(alpha_z * dt / duration) / learned)[..., None] / primitive.signals.forcing_precisions
     if configuration.forcing_noise == "posterior":
         variances = np.zeros_like(variances)
     return DeviationSystem(system.transition[..., None, :, :], system.input_vector[..., None, :], variances)
 
 
 def lasting_variances(primitive: Primitive) -> FloatArray:
-    """Variance of the position of a deviation that has gone on for long, about, (D,) array, data units squared.
+    """Variance of the position of a deviation that has gone on for long, about; (S,) array, units of the signal squared.
 
     Of p'' = -alpha p' - alpha^2 / 4 p + noise of density S, in units of the duration, it is 2 S / alpha^3.
     """
     if primitive.configuration.forcing_noise == "posterior":
-        return np.zeros(primitive.n_dof)
-    return 2 * primitive.phase_step / primitive.configuration.alpha_z**3 / primitive.forcing_precisions
+        return np.zeros(len(primitive.signals.names))
+    return np.asarray(2 * primitive.phase_step / primitive.configuration.alpha_z**3 / primitive.signals.forcing_precisions)

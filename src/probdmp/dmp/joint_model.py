@@ -1,8 +1,9 @@
 """A movement with constant, unknown parameters: the second way to carry their uncertainty.
 
-All that is unknown of an execution is drawn once, x = (p0, theta) of every degree of freedom, and a task tells part of it:
+All that is unknown of an execution is drawn once, x = (p0, theta) of every signal, which are the degrees of freedom and the
+sensor channels that were learned with them, and a task tells part of it:
 
-    x = mean + F z,  z ~ N(0, I);    state[t] = rows[t] x + d[t],    o[t] = (position of state[t]) + v[t],  v[t] ~ N(0, R)
+    x = mean + F z,  z ~ N(0, I);    state[t] = rows[t] x + d[t],    o[t] = C state[t] + v[t],  v[t] ~ N(0, R)
 
 What is seen early in a movement says how all of it will go. d is what the parameters leave over (`probdmp.dmp.deviations`).
 What is told of an execution, its goal or its start velocity, is told of rows[t] x. Inference over z and d is in
@@ -16,7 +17,7 @@ import numpy as np
 from probdmp.checks import FloatArray
 from probdmp.dmp.deviations import DeviationSystem, deviation_system, lasting_variances
 from probdmp.dmp.goal_handling import conditioned_part
-from probdmp.dmp.path_distribution import parameter_distribution, parameter_factor
+from probdmp.dmp.path_distribution import parameter_factor, signal_distribution
 from probdmp.dmp.primitive import Primitive
 from probdmp.dmp.responses import GOAL, START_VELOCITY, parameter_responses
 from probdmp.dmp.task import Task
@@ -29,7 +30,6 @@ __all__ = [
     "joint_executions",
     "joint_model",
     "mean_positions",
-    "position_designs",
     "state_designs",
     "state_rows",
 ]
@@ -44,16 +44,16 @@ class JointModel(NamedTuple):
     """x = means + factors z, and what is known about z; all arrays may have batch axes in front."""
 
     means: FloatArray
-    """(*batch, D, N + 3) array, data units."""
+    """(*batch, S, N + 3) array, units of each signal."""
     factors: FloatArray
-    """F, (*batch, D, N + 3, r) array, data units."""
+    """F, (*batch, S, N + 3, r) array, units of each signal."""
     belief: Belief
     """Of z, (*batch, r)."""
 
     def observed(self, rows: FloatArray, values: FloatArray, variances: FloatArray) -> "JointModel":
-        """Given values (*batch, D) of rows (*batch, N + 3) of each degree of freedom; NaN where nothing was seen."""
+        """Given values (*batch, S) of rows (*batch, N + 3) of each signal; NaN where nothing was seen."""
         design = _design(self.factors, rows[..., None, :])[..., 0, :]
-        return self._replace(belief=observe(self.belief, values - _along(self.means, rows), design, variances).belief)
+        return self._replace(belief=observe(self.belief, values - _along(self.means, rows), design, np.diag(variances)).belief)
 
 
 class JointExecutions(NamedTuple):
@@ -78,21 +78,25 @@ def joint_model(primitive: Primitive, task: Task, end_rows: FloatArray) -> Joint
     batch, handling = task.start.shape[:-1], primitive.configuration.goal_handling
     mean, factor = _start_and_parameters(primitive)
     factors = np.array(np.broadcast_to(factor, (*batch, *factor.shape)))
-    factors[..., START, :] *= np.isnan(task.start)[..., None]
+    factors[..., : primitive.n_dof, START, :] *= np.isnan(task.start)[..., None]
     means = np.array(np.broadcast_to(mean, (*batch, *mean.shape)))
-    means[..., START] = primitive.starts(task)
+    means[..., : primitive.n_dof, START] = primitive.starts(task)
     model = JointModel(means, factors, unit_belief(batch, factor.shape[-1]))
+    signals, n_untold = primitive.signals, len(primitive.channel_names)
+
+    def of_signals(told: FloatArray) -> FloatArray:  # nobody tells a channel where it has to be
+        return np.concatenate([told, np.full((*told.shape[:-1], n_untold), np.nan)], axis=-1)
+
     if task.start_velocity is not None:
-        told = task.start_velocity * task.duration[..., None]
+        told = of_signals(task.start_velocity * task.duration[..., None])
         row = np.eye(mean.shape[-1])[START_VELOCITY + 1]
-        model = _told(model, row, told, (TOLD_TOLERANCE * primitive.ranges) ** 2, START_VELOCITY + 1, handling)
-    variation = primitive.variation
-    left_over = primitive.observation_variances + lasting_variances(primitive)
-    tolerances = left_over if variation is None else variation.residual_variances
+        model = _told(model, row, told, (TOLD_TOLERANCE * signals.ranges) ** 2, START_VELOCITY + 1, handling)
+    left_over = signals.observation_variances + lasting_variances(primitive)
+    tolerances = left_over if signals.residual_variances is None else signals.residual_variances
     # A goal that was not told stays where it was learned: from another start, the movement to it is another.
     moved = np.where(np.isnan(task.goal), primitive.start - primitive.starts(task), np.nan)
-    model = _moved(model, end_rows, moved, tolerances, GOAL + 1, handling)
-    return _told(model, end_rows, task.goal, tolerances, GOAL + 1, handling)
+    model = _moved(model, end_rows, of_signals(moved), tolerances, GOAL + 1, handling)
+    return _told(model, end_rows, of_signals(task.goal), tolerances, GOAL + 1, handling)
 
 
 def state_rows(responses: FloatArray, duration: FloatArray) -> FloatArray:
@@ -113,19 +117,13 @@ def state_rows(responses: FloatArray, duration: FloatArray) -> FloatArray:
 
 
 def state_designs(model: JointModel, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The states of one time as functions of z: offsets (*batch, D, 3) and designs (*batch, D, 3, r).
+    """Values of one time as functions of z: offsets (*batch, S, k) and designs (*batch, S, k, r).
 
     Parameters
     ----------
-    rows : (*batch, 3, N + 3) array, see `state_rows`.
+    rows : (*batch, k, N + 3) array, of `state_rows`, or some of them.
     """
     return np.matmul(model.means, rows.mT), _design(model.factors, rows)
-
-
-def position_designs(model: JointModel, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The same of the positions alone: (*batch, D) and (*batch, D, r)."""
-    row = rows[..., POSITION, :]
-    return _along(model.means, row), _design(model.factors, row[..., None, :])[..., 0, :]
 
 
 def joint_executions(primitive: Primitive, tasks: Task, dts: FloatArray, n_steps: int) -> JointExecutions:
@@ -148,30 +146,28 @@ def joint_executions(primitive: Primitive, tasks: Task, dts: FloatArray, n_steps
 
 
 def mean_positions(executions: JointExecutions) -> FloatArray:
-    """Expected positions, (T, N, D) array, data units."""
+    """Expected values of all signals, (T, N, S) array."""
     model, positions = executions.model, executions.rows[:, :, POSITION]
     means = model.means + np.matmul(model.factors, model.belief.mean[:, None, :, None])[..., 0]
     return np.asarray(np.einsum("tkn,kdn->tkd", positions, means))
 
 
 def _start_and_parameters(primitive: Primitive) -> tuple[FloatArray, FloatArray]:
-    """Mean of x, (D, N + 3), and F, (D, N + 3, r), of executions whose start is not known."""
+    """Mean of x, (S, N + 3), and F, (S, N + 3, r), of executions whose start is not known."""
     d, n = primitive.n_dof, primitive.configuration.n_basis + 3
-    theta_mean, theta_covariance = parameter_distribution(primitive)
-    mean = np.concatenate([primitive.start[:, None], theta_mean.reshape(d, n - 1)], axis=1)
-    covariance, own = np.zeros((d, n, d, n)), np.arange(d)
-    covariance[:, 1:, :, 1:] = theta_covariance.reshape(d, n - 1, d, n - 1)
+    mean, parameters = signal_distribution(primitive)
+    mean[:d, START] = primitive.start
+    covariance, own = parameters.reshape(len(mean), n, len(mean), n), np.arange(d)
     covariance[own, START, own, START] = primitive.start_covariances[:, 1, 1]
     covariance[own, START, own, START_VELOCITY + 1] = primitive.start_covariances[:, 0, 1]
     covariance[own, START_VELOCITY + 1, own, START] = primitive.start_covariances[:, 0, 1]
-    full = covariance.reshape(d * n, d * n)
-    return mean, parameter_factor(full).reshape(d, n, -1)
+    return mean, parameter_factor(parameters).reshape(len(mean), n, -1)
 
 
 def _told(
     model: JointModel, row: FloatArray, values: FloatArray, tolerances: FloatArray, column: int, handling: str
 ) -> JointModel:
-    """Given values (*batch, D) of one row of x, as far as the model has them; the rest moves a column of x."""
+    """Given values (*batch, S) of one row of x, as far as the model has them; the rest moves a column of x."""
     expected, covariance = _expected(model, row, values, tolerances)
     delta = np.where(np.isnan(values), 0.0, values - expected)
     inside = conditioned_part(delta, covariance, handling)
@@ -184,7 +180,7 @@ def _told(
 def _moved(
     model: JointModel, row: FloatArray, deltas: FloatArray, tolerances: FloatArray, column: int, handling: str
 ) -> JointModel:
-    """The mean as if the row were told to be `deltas` from where it is, (*batch, D); as uncertain as before."""
+    """The mean as if the row were told to be `deltas` from where it is, (*batch, S); as uncertain as before."""
     if not np.any(deltas > 0) and not np.any(deltas < 0):
         return model
     expected, _ = _expected(model, row, deltas, tolerances)
@@ -193,7 +189,7 @@ def _moved(
 
 
 def _expected(model: JointModel, row: FloatArray, values: FloatArray, tolerances: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Mean (*batch, D) of one row of x, and its covariance, with a unit in place of what has no value."""
+    """Mean (*batch, S) of one row of x, and its covariance, with a unit in place of what has no value."""
     mean, covariance = linear_moments(model.belief, _design(model.factors, row[..., None, :])[..., 0, :])
     seen = ~np.isnan(values)
     full = covariance + tolerances[..., None] * np.eye(len(tolerances))
@@ -206,5 +202,5 @@ def _along(means: FloatArray, row: FloatArray) -> FloatArray:
 
 
 def _design(factors: FloatArray, rows: FloatArray) -> FloatArray:
-    """Rows (*batch, n, N + 3) of each degree of freedom as functions of z, (*batch, D, n, r)."""
+    """Rows (*batch, n, N + 3) of each signal as functions of z, (*batch, S, n, r)."""
     return np.matmul(rows[..., None, :, :], factors)

@@ -8,7 +8,7 @@ from probdmp.dmp.responses import GOAL, START_VELOCITY, WEIGHTS, parameter_respo
 from probdmp.dmp.transformation_system import POSITION
 from probdmp.dmp.variation import PathDistribution
 
-__all__ = ["parameter_distribution", "parameter_factor", "path_distribution"]
+__all__ = ["parameter_distribution", "parameter_factor", "path_distribution", "signal_distribution"]
 
 ROUNDING = 1e-15
 """Directions with less of the variance than this times their number are none."""
@@ -33,6 +33,26 @@ def parameter_distribution(primitive: Primitive) -> tuple[FloatArray, FloatArray
     return means.ravel(), covariance.reshape(d * n, d * n)
 
 
+def signal_distribution(primitive: Primitive) -> tuple[FloatArray, FloatArray]:
+    """Mean (S, N + 3) and covariance (S (N + 3), S (N + 3)) of (start, theta) of all signals, movements seen from their start.
+
+    So the start of a degree of freedom is zero, and known; that of a channel is where its sensor begins.
+    """
+    mean, covariance = parameter_distribution(primitive)
+    d, n, channels = primitive.n_dof, primitive.configuration.n_basis + 3, primitive.channels
+    lifted = np.delete(np.arange(d * n), np.arange(d) * n)  # where theta is in x
+    means, size = np.zeros(d * n), (d + len(primitive.channel_names)) * n
+    means[lifted] = mean
+    full = np.zeros((size, size))
+    full[np.ix_(lifted, lifted)] = covariance
+    if channels is not None:
+        means = np.concatenate([means, channels.means.ravel()])
+        full[d * n :, d * n :] = channels.covariance
+        full[d * n :, lifted] = channels.cross_covariance
+        full[lifted, d * n :] = channels.cross_covariance.T
+    return means.reshape(-1, n), full
+
+
 def parameter_factor(covariance: FloatArray) -> FloatArray:
     """F with F F^T = covariance, (n, r), r no larger than its rank; parameters may be of very different size."""
     stds = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
@@ -43,10 +63,14 @@ def parameter_factor(covariance: FloatArray) -> FloatArray:
 
 
 def path_distribution(primitive: Primitive, n_phases: int) -> PathDistribution:
-    """Displacements from the start, y(s) = p(s) - p0, of a new execution on n_phases phases s evenly spaced from 0 to 1."""
-    mean, covariance = parameter_distribution(primitive)
+    """All signals of a new execution on n_phases phases s evenly spaced from 0 to 1.
+
+    Of the degrees of freedom it is the displacement from the start, y(s) = p(s) - p0; of channels their value.
+    """
+    mean, covariance = signal_distribution(primitive)
     responses = parameter_responses(primitive.configuration, 1 / (n_phases - 1), n_phases)[:, POSITION]
-    d, n = primitive.n_dof, responses.shape[1]
-    half = np.einsum("mi,diej->mdej", responses, covariance.reshape(d, n, d, n))
-    full = half @ responses.T  # (M, D, D, M)
-    return PathDistribution(responses @ mean.reshape(d, n).T, np.moveaxis(full, -1, 2))
+    designs = np.concatenate([np.ones((n_phases, 1)), responses], axis=1)
+    n_signals, n = mean.shape
+    half = np.einsum("mi,diej->mdej", designs, covariance.reshape(n_signals, n, n_signals, n))
+    full = half @ designs.T  # (M, S, S, M)
+    return PathDistribution(designs @ mean.T, np.moveaxis(full, -1, 2))

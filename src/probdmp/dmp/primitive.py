@@ -1,12 +1,13 @@
 """The learned movement primitive: the paper's theta = {mu_w, Sigma_w, alpha, beta, R} and what it needs to run."""
 
 import hashlib
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from probdmp.checks import FloatArray, check_array, check_count, check_positive, check_seconds, frozen, shape_text
+from probdmp.dmp.channels import ChannelVariation, Signals
 from probdmp.dmp.configuration import Configuration
 from probdmp.dmp.task import Task
 from probdmp.dmp.variation import Variation, check_semidefinite
@@ -65,6 +66,8 @@ class Primitive:
     """Unit of the positions, free text."""
     variation: Variation | None = None
     """How the demonstrations differ from each other; None with pooled weights, which say nothing of it."""
+    channels: ChannelVariation | None = None
+    """Sensor channels that vary with the movement; None if none were learned."""
 
     def __post_init__(self) -> None:
         d, n = len(self.names), self.configuration.n_basis
@@ -89,6 +92,27 @@ class Primitive:
         object.__setattr__(self, "names", tuple(self.names))
         if self.variation is not None and self.variation.means.shape != (d, n + 2):
             raise InputError(f"variation of shape {shape_text((d, n + 2))}", shape_text(self.variation.means.shape))
+        self._check_channels()
+
+    def _check_channels(self) -> None:
+        channels, n = self.channels, self.configuration.n_basis
+        if channels is None:
+            return
+        if self.variation is None or self.configuration.weight_uncertainty != "joint":
+            raise InputError(
+                'weight_model="hierarchical" and weight_uncertainty="joint" with channels',
+                "other weights",
+                "A forcing term that is redrawn at every step says nothing about the channels.",
+            )
+        if not set(channels.names).isdisjoint(self.names):
+            raise InputError("channels named otherwise than the degrees of freedom", repr(channels.names))
+        shape = (len(channels.names) * (n + 3), self.variation.means.size)
+        if channels.cross_covariance.shape != shape:
+            raise InputError(
+                f"channels with a cross covariance of shape {shape_text(shape)}", shape_text(channels.cross_covariance.shape)
+            )
+        cross = channels.cross_covariance
+        check_semidefinite(np.block([[self.variation.covariance, cross.T], [cross, channels.covariance]]), "channels")
 
     @property
     def n_dof(self) -> int:
@@ -105,12 +129,43 @@ class Primitive:
         return tuple(bool(x) for x in large & (self.configuration.scaling == "paper"))
 
     @property
+    def channel_names(self) -> tuple[str, ...]:
+        """(F) names of the channels; empty if none were learned."""
+        return () if self.channels is None else self.channels.names
+
+    @property
+    def signals(self) -> Signals:
+        """Degrees of freedom and channels together."""
+        residuals = None if self.variation is None else self.variation.residual_variances
+        own = Signals(self.names, self.ranges, self.observation_variances, self.forcing_precisions, residuals)
+        if self.channels is None:
+            return own
+        names = (*self.names, *self.channels.names)
+        both = [np.concatenate([getattr(own, name), getattr(self.channels, name)]) for name in Signals._fields[1:]]
+        return Signals(names, *both)
+
+    def with_signal_noise(self, observation_variances: FloatArray, forcing_precisions: FloatArray) -> "Primitive":
+        """The primitive with another R and beta, (S,) arrays."""
+        d, channels = self.n_dof, self.channels
+        if channels is not None:
+            channels = replace(
+                channels, observation_variances=observation_variances[d:], forcing_precisions=forcing_precisions[d:]
+            )
+        return replace(
+            self,
+            observation_variances=observation_variances[:d],
+            forcing_precisions=forcing_precisions[:d],
+            channels=channels,
+        )
+
+    @property
     def identity(self) -> str:
         """SHA-256 of everything that determines what the primitive does; a detector knows its primitive by it."""
         digest = hashlib.sha256()
         for field in fields(self):
             value = getattr(self, field.name)
-            for part in value.arrays().values() if isinstance(value, Variation) else (value,):
+            parts = value.arrays().values() if isinstance(value, Variation | ChannelVariation) else (value,)
+            for part in (*parts, *(value.names if isinstance(value, ChannelVariation) else ())):
                 digest.update(part.tobytes() if isinstance(part, np.ndarray) else repr(part).encode())
         return digest.hexdigest()
 

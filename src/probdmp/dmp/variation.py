@@ -20,12 +20,12 @@ __all__ = ["PathDistribution", "Variation", "check_semidefinite"]
 
 
 class PathDistribution(NamedTuple):
-    """A Gaussian over displacements from the start on M phases."""
+    """A Gaussian over all signals on M phases: displacements from the start, and channels."""
 
     means: FloatArray
-    """(M, D) array, data units."""
+    """(M, S) array, units of each signal."""
     covariance: FloatArray
-    """(M, D, M, D) array, data units squared, without sensor noise."""
+    """(M, S, M, S) array, units of the signals multiplied, without sensor noise."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

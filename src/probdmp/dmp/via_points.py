@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from probdmp.checks import FloatArray, check_array, check_number
-from probdmp.dmp.path_distribution import parameter_distribution, parameter_factor
+from probdmp.dmp.channels import ChannelVariation
+from probdmp.dmp.path_distribution import parameter_factor, signal_distribution
 from probdmp.dmp.primitive import Primitive
 from probdmp.dmp.responses import GOAL, START_VELOCITY, WEIGHTS, parameter_responses
 from probdmp.dmp.transformation_system import POSITION
@@ -20,7 +21,7 @@ from probdmp.dmp.variation import Variation
 from probdmp.errors import InputError, InputTypeError
 from probdmp.gaussian import observe, unit_belief
 
-__all__ = ["ViaPoint", "condition_primitive", "with_variation"]
+__all__ = ["ViaPoint", "condition_primitive", "with_signals", "with_variation"]
 
 ViaPoint = tuple[float, ArrayLike, ArrayLike]
 """Time, seconds of the learned duration; position, (D,), data units, NaN where free; std, a number or (D,), data units."""
@@ -41,21 +42,53 @@ def condition_primitive(primitive: Primitive, points: Sequence[ViaPoint]) -> Pri
             "Learn it with ProbabilisticDMP(), whose weights are hierarchical and joint: forcing terms that are redrawn at "
             "every step say nothing about the rest of a movement.",
         )
-    (mean, covariance), d = parameter_distribution(primitive), primitive.n_dof
+    (means, covariance), d = signal_distribution(primitive), primitive.n_dof
     factor = parameter_factor(covariance)
-    means, factors = mean.reshape(d, -1), factor.reshape(d, len(mean) // d, -1)
+    factors = factor.reshape(*means.shape, -1)[:d]
     belief = unit_belief((), factor.shape[1])
     for time, position, std in _checked(primitive, points):
         row = _position_row(primitive, time)
-        belief = observe(belief, position - primitive.start - means @ row, row @ factors, std**2).belief
+        belief = observe(belief, position - primitive.start - means[:d] @ row, row @ factors, np.diag(std**2)).belief
     conditioned = factor @ belief.covariance @ factor.T
-    old = primitive.variation
-    residuals = primitive.observation_variances if old is None else old.residual_variances
-    shifted = (mean + factor @ belief.mean).reshape(d, -1)
-    return with_variation(primitive, Variation(shifted, (conditioned + conditioned.T) / 2, residuals))
+    signals = primitive.signals
+    residuals = signals.observation_variances if signals.residual_variances is None else signals.residual_variances
+    shifted = means + (factor @ belief.mean).reshape(means.shape)
+    both = (conditioned + conditioned.T) / 2
+    of_channels = (primitive.channel_names, signals.forcing_precisions[d:], signals.ranges[d:])
+    varied = with_signals(primitive, shifted, both, residuals, *of_channels)
+    return varied.with_signal_noise(signals.observation_variances, signals.forcing_precisions)
 
 
-def with_variation(primitive: Primitive, variation: Variation) -> Primitive:
+def with_signals(
+    primitive: Primitive,
+    means: FloatArray,
+    covariance: FloatArray,
+    residuals: FloatArray,
+    channels: Sequence[str],
+    channel_precisions: FloatArray,
+    channel_ranges: FloatArray,
+) -> Primitive:
+    """The primitive with another Gaussian over the parameters of all its signals; channels measure with their residual noise.
+
+    Parameters
+    ----------
+    means, covariance : as `signal_distribution` returns them.
+    residuals : (S,) array, units of each signal squared.
+    channels : (F) names.
+    channel_precisions, channel_ranges : (F,) arrays, see `ChannelVariation`.
+    """
+    d, (_, n) = primitive.n_dof, means.shape
+    theta, rest = np.delete(np.arange(d * n), np.arange(d) * n), slice(d * n, None)
+    variation = Variation(means[:d, 1:], covariance[np.ix_(theta, theta)], residuals[:d])
+    if not channels:
+        return with_variation(primitive, variation)
+    own, cross = covariance[rest, rest], covariance[rest, theta]
+    left = residuals[d:]
+    varied = ChannelVariation(tuple(channels), means[d:], own, cross, left, left, channel_precisions, channel_ranges)
+    return with_variation(primitive, variation, varied)
+
+
+def with_variation(primitive: Primitive, variation: Variation, channels: ChannelVariation | None = None) -> Primitive:
     """The primitive with another Gaussian over its parameters, and what the independent model needs of it in its own fields."""
     d, n = variation.means.shape
     blocks = variation.covariance.reshape(d, n, d, n)[np.arange(d), :, np.arange(d)]
@@ -70,6 +103,7 @@ def with_variation(primitive: Primitive, variation: Variation) -> Primitive:
         start_velocities=variation.means[:, START_VELOCITY],
         start_covariances=start_covariances,
         variation=variation,
+        channels=channels,
     )
 
 
@@ -91,7 +125,8 @@ def _checked(primitive: Primitive, points: Sequence[ViaPoint]) -> list[tuple[flo
 
 
 def _position_row(primitive: Primitive, time: float) -> FloatArray:
-    """H of the position at a time, (N + 2,) array; on a straight line between two steps of the learned rate."""
+    """(1, H) of the position at a time, (N + 3,) array; on a straight line between two steps of the learned rate."""
     at = time / primitive.dt
     responses = parameter_responses(primitive.configuration, primitive.dt / primitive.duration, int(at) + 2)[-2:, POSITION]
-    return np.asarray((int(at) + 1 - at) * responses[0] + (at - int(at)) * responses[1])
+    between = (int(at) + 1 - at) * responses[0] + (at - int(at)) * responses[1]
+    return np.concatenate([np.ones(1), between])

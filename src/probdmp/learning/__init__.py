@@ -3,7 +3,7 @@
 from probdmp.learning.fit import fit_primitive
 from probdmp.learning.observation_noise import ObservationNoise, estimate_observation_noise
 from probdmp.learning.options import FitReport, LearningOptions
-from probdmp.learning.varied_weights import left_out_variations
+from probdmp.learning.varied_weights import left_out_primitives
 
 __all__ = [
     "FitReport",
@@ -11,5 +11,5 @@ __all__ = [
     "ObservationNoise",
     "estimate_observation_noise",
     "fit_primitive",
-    "left_out_variations",
+    "left_out_primitives",
 ]

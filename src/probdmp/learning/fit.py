@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from probdmp.checks import FloatArray
-from probdmp.demonstrations import Demonstration, mean_ranges, noise_stds, smooth_path, stack_positions
+from probdmp.demonstrations import Demonstration, mean_ranges, noise_stds, smooth_path, stack_signals
 from probdmp.dmp import Configuration, Primitive, Task, demonstrated_tasks, linear_gaussian_model
 from probdmp.dmp.joint_model import joint_executions, mean_positions
 from probdmp.dmp.transformation_system import POSITION
@@ -34,12 +34,15 @@ def fit_primitive(
         hint = "Scaled by each goal, a movement is not linear in goal and weights, which vary together. "
         hint += 'Use weight_model="pooled", or ProbabilisticDMP.as_published().'
         raise InputError('scaling="none" with weight_model="hierarchical"', 'scaling="paper"', hint)
+    if options.channels and configuration.weight_uncertainty != "joint":
+        hint = "A forcing term that is redrawn at every step says nothing about the channels."
+        raise InputError('weight_uncertainty="joint" with channels', repr(configuration.weight_uncertainty), hint)
     paths = [smooth_path(d, options.smoothing) for d in demonstrations]
     velocities = [scheme_velocities(p, d.dt, configuration.discretization) for p, d in zip(paths, demonstrations, strict=True)]
     tasks = demonstrated_tasks(demonstrations)
     still = _still_primitive(demonstrations, tasks, configuration, np.stack([v[0] for v in velocities]))
     if options.weight_model == "hierarchical":
-        moving = varied_weights(still, demonstrations)
+        moving = varied_weights(still, demonstrations, options)
     else:
         targets = [
             forcing_targets(path.positions, v, goal, d.dt, configuration)
@@ -53,14 +56,15 @@ def _with_observation_noise(
     moving: Primitive, tasks: Task, demonstrations: Sequence[Demonstration]
 ) -> tuple[Primitive, FitReport]:
     """The primitive with its R, and how far its rollouts are from the demonstrations."""
-    observed, dts = stack_positions(demonstrations), np.array([d.dt for d in demonstrations])
+    observed, dts = stack_signals(demonstrations, moving.channel_names), np.array([d.dt for d in demonstrations])
     joint = moving.configuration.weight_uncertainty == "joint"
     if joint and moving.variation is not None:
         rollouts = mean_positions(joint_executions(moving, tasks, dts, len(observed)))
     else:
         model = linear_gaussian_model(moving, tasks, dts, len(observed))
         rollouts = filter_sequence(model).filtered.means[..., POSITION]
-    squared_errors = _squared_errors(observed, rollouts)
+    d = moving.n_dof
+    squared_errors = _squared_errors(observed[..., :d], rollouts[..., :d])
     relative_errors = np.sqrt(squared_errors) / moving.ranges
     if not joint:
         noise = _observation_noise(model, observed, squared_errors, moving.ranges)

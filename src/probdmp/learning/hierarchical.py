@@ -5,6 +5,12 @@
     M  mu = mean m_k,   Sigma = (1 - rho) [sum_k (m_k - mu)(m_k - mu)^T / (K - 1) + C] + rho Sigma_0,
        R = mean of (y_k[t] - H[t] m_k)^2 + H[t] C H[t]^T
 
+theta_k holds the parameters of all signals of demonstration k: its degrees of freedom, seen from their start, and its sensor
+channels, whose start is a parameter like the others and whose end is nobody's goal.
+
+Sigma may couple signals, or hold that they vary independently: then what was found between them is left out. With
+`coupling="auto"` the likelier of the two is taken, by the density of each demonstration given what the others teach.
+
 The inverse-Wishart prior around Sigma_0 counts as much as rho / (1 - rho) (K - 1) demonstrations. With one demonstration
 nothing is left but Sigma_0. The covariance of a new execution is (1 + 1 / K) Sigma: mu is not known better.
 Source: Bishop, Pattern Recognition and Machine Learning, chapters 9 and 2.3.6; Lazaric & Ghavamzadeh, Bayesian multi-task
@@ -16,11 +22,10 @@ from typing import NamedTuple
 import numpy as np
 
 from probdmp.checks import FloatArray
-from probdmp.dmp import Variation
 from probdmp.dmp.responses import GOAL
 from probdmp.learning.variation_prior import prior_covariance
 
-__all__ = ["estimate_variation"]
+__all__ = ["SignalEstimate", "estimate_variation"]
 
 PRIOR_WEIGHT = 0.5
 """rho, between 0 and 1."""
@@ -37,75 +42,164 @@ TOLERANCE = 0.01
 """Relative change of every R below which the iteration stops."""
 
 
+COMPARED_PHASES = 26
+"""Phases of a demonstration by which the two ways to couple signals are compared; those between say little more."""
+
+
+class SignalEstimate(NamedTuple):
+    """The Gaussian over the parameters of a new execution, as `probdmp.dmp.path_distribution.signal_distribution` has it."""
+
+    means: FloatArray
+    """(S, N + 3) array, units of each signal."""
+    covariance: FloatArray
+    """(S (N + 3), S (N + 3)) array."""
+    residuals: FloatArray
+    """(S,) array, units squared: of what was recorded around the paths of the parameters."""
+    is_coupled: bool
+    """Whether signals vary together."""
+
+
 class _Posteriors(NamedTuple):
     means: FloatArray
-    """m_k, (K, D (N + 2))."""
+    """m_k, (K, P)."""
     covariance: FloatArray
-    """C, (D (N + 2), D (N + 2))."""
+    """C, (P, P)."""
 
 
-def estimate_variation(responses: FloatArray, displacements: FloatArray, ranges: FloatArray) -> Variation:
+class _Problem(NamedTuple):
+    """All in units of each signal's range, so that nothing has a unit."""
+
+    designs: FloatArray
+    """H, (M, n) array, n parameters of each signal; with channels a column of ones goes first."""
+    paths: FloatArray
+    """y, (K, M, S)."""
+    has_goal: FloatArray
+    """(S,) one for degrees of freedom, which end at their goal; zero for channels."""
+    goal: int
+    """Which parameter that is."""
+
+
+def estimate_variation(
+    responses: FloatArray, paths: FloatArray, ranges: FloatArray, n_channels: int = 0, coupling: str = "full"
+) -> SignalEstimate:
     """How executions of a movement differ, from demonstrations on common phases.
 
     Parameters
     ----------
     responses : H, (M, N + 2) array, of the position on M phases evenly spaced from 0 to 1.
-    displacements : y, (K, M, D) array, data units: positions minus the start of each demonstration.
-    ranges : (D,) array, data units.
+    paths : y, (K, M, S) array, units of each signal: positions minus the start of each demonstration, then channels.
+    ranges : (S,) array, units of each signal.
+    n_channels : F, how many of the signals are channels.
+    coupling : `"full"`, `"none"` or `"auto"`.
     """
-    k, m, d = displacements.shape
-    y = displacements / ranges  # so that nothing below has a unit
-    mean_path = y.mean(axis=0)
-    variances = np.full(d, SINGLE_STD**2)
+    k, m, n_signals = paths.shape
+    designs = np.concatenate([np.ones((m, 1)), responses], axis=1) if n_channels else responses
+    has_goal = np.where(np.arange(n_signals) < n_signals - n_channels, 1.0, 0.0)
+    problem = _Problem(designs, paths / ranges, has_goal, designs.shape[1] - responses.shape[1] + GOAL)
+    mean_path = problem.paths.mean(axis=0)
+    variances = np.full(n_signals, SINGLE_STD**2)
     if k > 1:
-        variances = np.maximum(np.sum((y - mean_path) ** 2, axis=(0, 1)) / ((k - 1) * m), LEAST_STD**2)
-    covariance = prior = prior_covariance(responses, mean_path, variances)
-    residuals = np.maximum(0.01 * variances, LEAST_RESIDUAL**2)
-    mean = _posteriors(responses, mean_path[None], np.zeros(len(prior)), 100 * prior, residuals).means[0]
+        variances = np.maximum(np.sum((problem.paths - mean_path) ** 2, axis=(0, 1)) / ((k - 1) * m), LEAST_STD**2)
+    prior = prior_covariance(responses, mean_path, variances, n_channels)
+    is_coupled = coupling != "none"
+    mean, covariance, residuals, posteriors = _maximize(problem, prior, variances, is_coupled)
+    if coupling == "auto" and k > 2 and n_signals > 1 and not _is_coupling_likelier(problem, prior, residuals, posteriors):
+        is_coupled = False
+        mean, covariance, residuals, _ = _maximize(problem, prior, variances, is_coupled)
+    unit = np.repeat(ranges, designs.shape[1])
+    covariance = (1 + 1 / k) * covariance * unit[:, None] * unit
+    means, covariance = _with_starts((mean * unit).reshape(n_signals, -1), (covariance + covariance.T) / 2, n_channels)
+    return SignalEstimate(means, covariance, residuals * ranges**2, is_coupled)
+
+
+def _maximize(
+    problem: _Problem, prior: FloatArray, variances: FloatArray, is_coupled: bool
+) -> tuple[FloatArray, FloatArray, FloatArray, _Posteriors]:
+    """mu (P), Sigma (P, P) and R (S), and what is then known of the demonstrations."""
+    residuals, covariance = np.maximum(0.01 * variances, LEAST_RESIDUAL**2), prior
+    average = problem._replace(paths=problem.paths.mean(axis=0, keepdims=True))
+    mean = _posteriors(average, np.zeros(len(prior)), 100 * prior, residuals).means[0]
     for _ in range(MOST_ITERATIONS):
-        posteriors = _posteriors(responses, y, mean, covariance, residuals)
+        posteriors = _posteriors(problem, mean, covariance, residuals)
         mean = posteriors.means.mean(axis=0)
-        if k > 1:
-            deviations = posteriors.means - mean
-            between = deviations.T @ deviations / (k - 1) + posteriors.covariance
-            covariance = (1 - PRIOR_WEIGHT) * between + PRIOR_WEIGHT * prior
-        before, residuals = residuals, np.maximum(_residual_variances(responses, y, posteriors), LEAST_RESIDUAL**2)
+        if len(problem.paths) > 1:
+            covariance = _between(posteriors, prior, len(variances), is_coupled)
+        before, residuals = residuals, np.maximum(_residual_variances(problem, posteriors), LEAST_RESIDUAL**2)
         if np.all(np.abs(residuals - before) <= TOLERANCE * before):
             break
-    unit = np.repeat(ranges, responses.shape[1])
-    covariance = (1 + 1 / k) * covariance * unit[:, None] * unit
-    return Variation((mean * unit).reshape(d, -1), (covariance + covariance.T) / 2, residuals * ranges**2)
+    return mean, covariance, residuals, posteriors
 
 
-def _posteriors(
-    responses: FloatArray, displacements: FloatArray, mean: FloatArray, covariance: FloatArray, residuals: FloatArray
-) -> _Posteriors:
+def _between(posteriors: _Posteriors, prior: FloatArray, n_signals: int, is_coupled: bool) -> FloatArray:
+    """Sigma of the M step."""
+    deviations = posteriors.means - posteriors.means.mean(axis=0)
+    between = deviations.T @ deviations / (len(deviations) - 1) + posteriors.covariance
+    covariance = (1 - PRIOR_WEIGHT) * between + PRIOR_WEIGHT * prior
+    if not is_coupled:
+        size = len(prior) // n_signals
+        covariance = covariance * np.kron(np.eye(n_signals), np.ones((size, size)))
+    return covariance
+
+
+def _is_coupling_likelier(problem: _Problem, prior: FloatArray, residuals: FloatArray, posteriors: _Posteriors) -> bool:
+    """Whether demonstrations are likelier given the others if signals vary together."""
+    k, m, n_signals = problem.paths.shape
+    rows = np.unique(np.linspace(1, m - 1, COMPARED_PHASES).round().astype(int))
+    whole = np.kron(np.eye(n_signals), problem.designs[rows])
+    noise = np.repeat(residuals, len(rows))
+    gain = 0.0
+    for left_out in range(k):
+        others = posteriors._replace(means=np.delete(posteriors.means, left_out, axis=0))
+        error = problem.paths[left_out, rows].T.ravel() - whole @ others.means.mean(axis=0)
+        for is_coupled in (True, False):
+            covariance = whole @ ((1 + 1 / (k - 1)) * _between(others, prior, n_signals, is_coupled)) @ whole.T
+            factor = np.linalg.cholesky(covariance + np.diag(noise))
+            square = np.sum(np.linalg.solve(factor, error) ** 2)
+            gain += (-0.5 if is_coupled else 0.5) * (square + 2 * np.log(np.diagonal(factor)).sum())
+    return bool(gain > 0)
+
+
+def _with_starts(means: FloatArray, covariance: FloatArray, n_channels: int) -> tuple[FloatArray, FloatArray]:
+    """With the start of each signal as its first parameter; without channels there is none yet, and it is zero."""
+    if n_channels:
+        return means, covariance
+    n_signals, n = means.shape
+    kept = np.delete(np.arange(n_signals * (n + 1)), np.arange(n_signals) * (n + 1))
+    full = np.zeros((n_signals * (n + 1),) * 2)
+    full[np.ix_(kept, kept)] = covariance
+    return np.concatenate([np.zeros((n_signals, 1)), means], axis=1), full
+
+
+def _posteriors(problem: _Problem, mean: FloatArray, covariance: FloatArray, residuals: FloatArray) -> _Posteriors:
     """The E step: theta of every demonstration given its path, and its end, which is its goal.
 
     Parameters
     ----------
-    mean, covariance : mu and Sigma, (D (N + 2)) and (D (N + 2), D (N + 2)).
-    residuals : R, (D,), in units of the range squared, as all else.
+    mean, covariance : mu and Sigma, (P) and (P, P).
+    residuals : R, (S,), in units of the range squared, as all else.
     """
-    (k, _, d), n = displacements.shape, responses.shape[1]
-    goal = np.eye(n)[GOAL]
+    designs, paths, has_goal, goal = problem
+    (k, _, n_signals), n = paths.shape, designs.shape[1]
+    row = np.eye(n)[goal]
     # Sigma = F F^T: in terms of F no parameter is larger than another, and none needs to vary.
     eigenvalues, vectors = np.linalg.eigh(covariance)
     factor = vectors * np.sqrt(np.maximum(eigenvalues, 0.0))
-    information = np.kron(np.diag(1 / residuals), responses.T @ responses)
-    information += np.kron(np.eye(d), np.outer(goal, goal)) / GOAL_TOLERANCE**2
-    errors = displacements - responses @ mean.reshape(d, n).T[None]
-    scores = np.einsum("kmd,mn->kdn", errors / residuals, responses)
-    scores[..., GOAL] += (displacements[:, -1] - mean.reshape(d, n)[:, GOAL]) / GOAL_TOLERANCE**2
+    information = np.kron(np.diag(1 / residuals), designs.T @ designs)
+    information += np.kron(np.diag(has_goal), np.outer(row, row)) / GOAL_TOLERANCE**2
+    errors = paths - designs @ mean.reshape(n_signals, n).T[None]
+    scores = np.einsum("kmd,mn->kdn", errors / residuals, designs)
+    scores[..., goal] += has_goal * (paths[:, -1] - mean.reshape(n_signals, n)[:, goal]) / GOAL_TOLERANCE**2
     precision = np.eye(len(mean)) + factor.T @ information @ factor
     gain = factor @ np.linalg.solve(precision, factor.T)
     return _Posteriors(mean + scores.reshape(k, -1) @ gain.T, (gain + gain.T) / 2)
 
 
-def _residual_variances(responses: FloatArray, displacements: FloatArray, posteriors: _Posteriors) -> FloatArray:
-    """R, (D,) array; the start, which is zero by definition, says nothing."""
-    (k, m, d), n = displacements.shape, responses.shape[1]
-    errors = displacements - np.einsum("mn,kdn->kmd", responses, posteriors.means.reshape(k, d, n))
-    blocks = posteriors.covariance.reshape(d, n, d, n)[np.arange(d), :, np.arange(d)]
-    spread = np.einsum("mn,dno,mo->d", responses, blocks, responses, optimize=True)
-    return np.asarray((np.sum(errors**2, axis=(0, 1)) / k + spread) / (m - 1))
+def _residual_variances(problem: _Problem, posteriors: _Posteriors) -> FloatArray:
+    """R, (S,) array; the start of a degree of freedom, which is zero by definition, says nothing."""
+    designs, paths = problem.designs, problem.paths
+    (k, m, n_signals), n = paths.shape, designs.shape[1]
+    errors = paths - np.einsum("mn,kdn->kmd", designs, posteriors.means.reshape(k, n_signals, n))
+    own = np.arange(n_signals)
+    blocks = posteriors.covariance.reshape(n_signals, n, n_signals, n)[own, :, own]
+    spread = np.einsum("mn,dno,mo->d", designs, blocks, designs, optimize=True)
+    return np.asarray((np.sum(errors**2, axis=(0, 1)) / k + spread) / (m - problem.has_goal))

@@ -2,7 +2,7 @@
 
     r_k[t] = y_k[t] - H[t] m_k = d_k[t] + v_k[t],    d[t] = A d[t-1] + B eps[t-1],  eps ~ N(0, 1 / beta),    v ~ N(0, R)
 
-m_k is theta of demonstration k given all of it, C what is not known about it. beta and R of each degree of freedom maximise the
+m_k is theta of demonstration k given all of it, C what is not known about it. beta and R of each signal maximise the
 expected log-likelihood of the residuals under a Kalman filter,
 
     E ln p = -1/2 sum_kt [ln S_k[t] + (e_k[t]^2 + c_k[t]) / S_k[t]]
@@ -12,7 +12,6 @@ a search: scaled together, they scale S, and the best scale is the mean of (e^2 
 Source: Durbin & Koopman, Time Series Analysis by State Space Methods, section 2.10, the concentrated likelihood.
 """
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -61,20 +60,21 @@ def with_residual_noise(primitive: Primitive, tasks: Task, dts: FloatArray, obse
     primitive : its R is taken for the variance of the residuals.
     tasks : of the K demonstrations.
     dts : (K) array, seconds.
-    observed : (T, K, D) array, data units; NaN after the end of a shorter demonstration.
+    observed : (T, K, S) array of all signals; NaN after the end of a shorter demonstration.
     """
+    signals = primitive.signals
+    n_signals = len(signals.names)
     residuals = _residuals(primitive, joint_executions(primitive, tasks, dts, len(observed)), observed)
-    unit = replace(primitive, forcing_precisions=np.ones(primitive.n_dof))
+    unit = primitive.with_signal_noise(signals.observation_variances, np.ones(n_signals))
     system, lasting = deviation_system(unit, tasks.duration, dts), lasting_variances(unit)
-    best = np.ones(1)  # one for all degrees of freedom at first: they share the gains
+    best = np.ones(1)  # one for all signals at first: they share the gains
     for finer in (RATIOS, FINER):
         ratios = finer[:, None] * best
         likelihoods, scales = _likelihoods(residuals, system, ratios / lasting[: len(best)])
         chosen = np.argmax(likelihoods, axis=0)
-        best = np.broadcast_to(ratios, scales.shape)[chosen, np.arange(primitive.n_dof)]
-    variances = scales[chosen, np.arange(primitive.n_dof)]
-    variances = np.maximum(variances, LEAST_VARIANCE * primitive.ranges**2)
-    return replace(primitive, observation_variances=variances, forcing_precisions=lasting / (best * variances))
+        best = np.broadcast_to(ratios, scales.shape)[chosen, np.arange(n_signals)]
+    variances = np.maximum(scales[chosen, np.arange(n_signals)], LEAST_VARIANCE * signals.ranges**2)
+    return primitive.with_signal_noise(variances, lasting / (best * variances))
 
 
 def _residuals(primitive: Primitive, executions: JointExecutions, observed: FloatArray) -> _Residuals:
@@ -85,7 +85,7 @@ def _residuals(primitive: Primitive, executions: JointExecutions, observed: Floa
     seen = ~np.isnan(np.moveaxis(observed, 0, -1))
     seen[..., 0] = False
     (k, *_, r), step = designs.shape, -(-len(observed) // MOST_TIMES)
-    weights = (seen / primitive.observation_variances[:, None])[..., ::step].reshape(k, -1, 1)
+    weights = (seen / primitive.signals.observation_variances[:, None])[..., ::step].reshape(k, -1, 1)
     some = designs[:, :, ::step].reshape(k, -1, r)
     mean, prior = model.belief
     surprise = errors[..., ::step].reshape(k, -1, 1) - some @ mean[..., None]
