@@ -23,13 +23,21 @@ from probdmp import (
 )
 from probdmp.dmp import task_for
 from probdmp.errors import InputError, InputTypeError, ModelFileError, NotFittedError
-from probdmp.execution import roll_out, score_recordings, task_of_recording, track_recording
+from probdmp.execution import (
+    SensorArray,
+    roll_out,
+    score_recordings,
+    smooth_recording,
+    state_sensor,
+    task_of_recording,
+    track_recording,
+)
 from probdmp.io import ModelContents, write_model
 
 DEFAULTS = {
     "n_basis": 30, "weight_model": "hierarchical", "weight_uncertainty": "joint", "forcing_noise": "predictive",
     "discretization": "exact", "scaling": "none", "alpha_z": 25.0, "smoothing": 0.05,
-    "goal_handling": "blend",
+    "goal_handling": "blend", "coupling": "full", "channels": (),
 }  # fmt: skip
 
 
@@ -398,7 +406,7 @@ def test_a_detector_of_other_primitives_is_not_saved(learned, library, letters, 
 )
 def test_a_damaged_detector_in_a_file(learned, letters, tmp_path, damage):
     state = FailureDetector().fit(learned, letters["s"]).state() | damage
-    write_model(tmp_path / "s.probdmp", ModelContents({"": learned.primitive_}, {"": learned.get_params()}, state))
+    write_model(tmp_path / "s.probdmp", ModelContents({"": learned.primitive_}, {"": {"smoothing": 0.05}}, state))
     with pytest.raises(ModelFileError, match=r"Expected .* in .*s\.probdmp.* Fit the detector and save the model again"):
         load_detector(tmp_path / "s.probdmp")
     assert load(tmp_path / "s.probdmp").primitive_.identity == learned.primitive_.identity
@@ -539,3 +547,120 @@ def test_the_papers_scaling_goes_with_the_papers_weights(letters, setting):
     with pytest.raises(InputError, match=r'Expected scaling="none" with weight.*ProbabilisticDMP.as_published\(\)'):
         ProbabilisticDMP(scaling="paper", **setting).fit(letters["s"])
     ProbabilisticDMP(scaling="paper", **PAPERS_WEIGHTS).fit(letters["s"])
+
+
+# --- sensors and channels ---------------------------------------------------------------------------------------------
+
+
+def sensors_of(learned, gate=None):
+    p = learned.primitive_
+    velocity = state_sensor(p, "gyro", "velocity", 0.5 * p.ranges / p.duration, gate=gate)
+    return [state_sensor(p, "camera", "position", 0.02 * p.ranges, gate=gate), velocity]
+
+
+@pytest.fixture(scope="module")
+def watched(varied):
+    """Executions as the sensors recorded them."""
+    return varied.sample_recordings(3, sensors=sensors_of(varied), random_state=0)
+
+
+def test_every_method_takes_sensors(varied, watched):
+    sensors, recording = sensors_of(varied), watched[0]
+    array = SensorArray(varied.primitive_, sensors)
+    task = task_of_recording(varied.primitive_, recording)
+    track = varied.track(recording, sensors=sensors)
+    assert_same_trajectory(track, track_recording(varied.primitive_, task, recording, array))
+    assert list(track.sensors) == ["camera", "gyro"]
+    assert_same_trajectory(
+        varied.smooth(recording, sensors=sensors), smooth_recording(varied.primitive_, task, recording, array)
+    )
+    scores = varied.score_samples(watched, sensors=sensors)
+    np.testing.assert_allclose(scores[0], track.log_likelihoods.sum(), rtol=1e-9)
+    execution = varied.execute(recording.positions[0], duration=recording.duration, dt=recording.dt, sensors=sensors)
+    velocities = np.column_stack(list(recording.channels.values()))
+    for position, velocity, wanted in zip(recording.positions, velocities, track.contributions, strict=True):
+        step = execution.step({"camera": position, "gyro": velocity})
+        np.testing.assert_allclose(step.contributions, wanted, rtol=1e-7, atol=1e-7)
+
+
+def test_readings_by_name_are_a_recording(varied, watched):
+    recording, sensors = watched[1], sensors_of(varied)
+    by_name = {"gyro": np.column_stack(list(recording.channels.values())), "camera": recording.positions}
+    for run in (varied.track, varied.smooth):
+        assert_same_trajectory(run(by_name, dt=recording.dt, sensors=sensors), run(recording, sensors=sensors))
+    alone = varied.track({"camera": recording.positions}, dt=recording.dt, sensors=sensors[:1])
+    assert_same_trajectory(alone, varied.track(recording, sensors=sensors[:1]))  # other columns are of no interest
+
+
+def test_unless_told_positions_are_measured_as_in_the_demonstrations(varied, letters):
+    demo = letters["s"][0]
+    p = varied.primitive_
+    own = [replace(state_sensor(p, "position", "position", 1.0), covariance=p.observation_variances)]
+    assert_same_trajectory(varied.track(demo), varied.track(demo, sensors=own))
+    np.testing.assert_array_equal(varied.score_samples([demo]), varied.score_samples([demo], sensors=own))
+
+
+def test_feedback_is_of_the_sensors_that_are_named(varied, watched):
+    recording, sensors = watched[2], sensors_of(varied)
+    start, plan = recording.positions[0], varied.rollout(recording.positions[0])
+    blind = varied.execute(start, sensors=sensors, feedback=[])
+    for position, wanted in zip(recording.positions[:-1], plan.positions[1:], strict=True):
+        np.testing.assert_allclose(blind.step({"camera": position}).position, wanted, atol=1e-9 * np.abs(plan.positions).max())
+    assert blind.sensor_counts["camera"].n_fused == len(recording.positions) - 1
+
+
+def test_recordings_are_drawn_as_the_sensors_would_have_them(varied, watched):
+    again = varied.sample_recordings(3, sensors=sensors_of(varied), random_state=0)
+    for one, other in zip(watched, again, strict=True):
+        np.testing.assert_array_equal(one.positions, other.positions)
+        assert list(one.channels) == ["velocity_x", "velocity_y"]
+        assert (one.names, one.dt) == (varied.primitive_.names, varied.primitive_.dt)
+    bare = varied.sample_recordings(1, duration=1.0, dt=0.05, random_state=1)[0]
+    assert (bare.n_samples, dict(bare.channels)) == (21, {})
+    gyro = varied.sample_recordings(1, sensors=sensors_of(varied)[1:], random_state=1)[0]
+    assert np.isnan(gyro.positions).all()  # which no sensor measures
+
+
+def test_sensor_noise_is_learned_from_recordings(varied):
+    sensors = sensors_of(varied, gate=4.0)
+    recordings = varied.sample_recordings(20, sensors=sensors, dt=0.05, random_state=3)
+    first = [replace(s, covariance=4 * s.covariance) for s in sensors]
+    noise = varied.learn_sensor_noise(first, recordings)
+    assert noise.converged
+    for found, true in zip(noise.sensors, sensors, strict=True):
+        np.testing.assert_allclose(np.diagonal(found.covariance), np.diagonal(true.covariance), rtol=0.25)
+        assert found.gate == 4.0
+    unknown = [task_for(varied.primitive_, [np.nan, np.nan], duration=r.duration) for r in recordings]
+    told = varied.learn_sensor_noise(first, recordings, tasks=unknown)
+    np.testing.assert_array_equal(told.sensors[0].covariance, noise.sensors[0].covariance)
+
+
+def test_a_channel_is_learned_tracked_and_kept(letters, tmp_path):
+    demos = [replace(d, channels={"force": 1 + d.positions[:, 0] - d.positions[0, 0]}) for d in letters["s"]]
+    felt = ProbabilisticDMP(10, channels=["force"]).fit(demos)
+    assert felt.primitive_.channel_names == ("force",)
+    rolled = felt.rollout()
+    wanted = 1 + rolled.positions[:, 0] - rolled.positions[0, 0]
+    np.testing.assert_allclose(rolled.channels["force"].means, wanted, atol=0.05 * felt.primitive_.ranges[0])
+    track = felt.track(demos[0])
+    assert track.outputs == ("x", "y", "force")
+    assert list(track.channels) == ["force"]
+    execution = felt.execute(demos[0].positions[0])
+    step = execution.step({"position": demos[0].positions[0], "force": 1.0})
+    assert step.channels["force"].means.shape == (1,)
+    felt.save(tmp_path / "felt.probdmp")
+    again = load(tmp_path / "felt.probdmp")
+    assert again.primitive_.identity == felt.primitive_.identity
+    assert list(again.channels) == ["force"]
+    assert_same_trajectory(again.track(demos[0]), track)
+    other = again.fit(demos)  # with the settings of the file
+    assert other.primitive_.identity == felt.primitive_.identity
+
+
+def test_coupling_is_a_setting(letters):
+    none = ProbabilisticDMP(8, coupling="none").fit(letters["s"]).primitive_
+    n = none.variation.means.shape[1]
+    assert not none.variation.covariance[:n, n:].any()
+    assert ProbabilisticDMP(8).fit(letters["s"]).primitive_.variation.covariance[:n, n:].any()
+    with pytest.raises(InputError, match="coupling to be one of 'auto', 'full', 'none', got 'some'"):
+        ProbabilisticDMP(8, coupling="some").fit(letters["s"])

@@ -280,8 +280,8 @@ class AlarmAt:
     def __init__(self, tick):
         self.tick, self.shown = tick, []
 
-    def monitor(self, primitive, task, dt):
-        self.shown = []
+    def monitor(self, primitive, task, dt, outputs):
+        self.shown, self.outputs = [], outputs
         detector, verdict = self, SimpleNamespace(failed=False)
 
         class Monitor:

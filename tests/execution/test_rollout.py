@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from strategies import make_primitive, primitives, seeds
 
 from probdmp.demonstrations import synthetic_letters
-from probdmp.dmp import Configuration, linear_gaussian_model, step_count, task_for
+from probdmp.dmp import Configuration, linear_gaussian_model, stack_tasks, step_count, task_for
 from probdmp.execution import position_covariances, roll_out, sample_trajectories
 from probdmp.gaussian import filter_sequence
 from probdmp.learning import LearningOptions, fit_primitive
@@ -21,10 +21,11 @@ def test_rollout_is_the_filter_with_nothing_observed(primitive, duration, dt):
     task = task_for(primitive, duration=duration)
     rolled = roll_out(primitive, task, dt)
     n_steps = step_count(duration, dt)
-    nothing = np.full((n_steps, primitive.n_dof, 1), np.nan)
-    wanted = filter_sequence(linear_gaussian_model(primitive, task, dt, n_steps), nothing).filtered
-    np.testing.assert_array_equal(rolled.means, wanted.means)
-    np.testing.assert_array_equal(rolled.covariances, wanted.covariances)
+    nothing = np.full((n_steps, 1, primitive.n_dof, 1), np.nan)
+    model = linear_gaussian_model(primitive, stack_tasks([task]), np.array([dt]), n_steps)  # a batch of one
+    wanted = filter_sequence(model, nothing).filtered
+    np.testing.assert_array_equal(rolled.means, wanted.means[:, 0])
+    np.testing.assert_array_equal(rolled.covariances, wanted.covariances[:, 0])
     np.testing.assert_allclose(rolled.times, np.arange(n_steps) * dt, rtol=1e-15)
     assert (rolled.names, rolled.units) == (primitive.names, primitive.units)
 

@@ -111,7 +111,8 @@ def _restored(contents: ModelContents, label: str) -> ProbabilisticDMP:
     """The estimator as it was after fitting, but for its fit report."""
     primitive = contents.primitives[label]
     try:
-        estimator = ProbabilisticDMP(**{**contents.settings[label], **asdict(primitive.configuration)})
+        learned = asdict(primitive.configuration) | {"channels": primitive.channel_names}
+        estimator = ProbabilisticDMP(**{**contents.settings[label], **learned})
     except (KeyError, TypeError) as error:
         hint = "Learn and save the model again."
         raise ModelFileError(f"settings of {label!r} that ProbabilisticDMP takes", str(error), hint) from error

@@ -1,39 +1,44 @@
 """One movement: scikit-learn manners, no arithmetic."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields, replace
-from inspect import signature
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from probdmp.checks import FloatArray, check_array, check_choice, check_count, check_seconds
+from probdmp.checks import FloatArray, check_count, check_generator, check_noise_stds
 from probdmp.demonstrations import Demonstration, Recording, Recordings, as_demonstrations
 from probdmp.detection import FailureDetector
-from probdmp.dmp import PUBLISHED, Configuration, Primitive, Task, ViaPoint, condition_primitive, task_for
-from probdmp.errors import InputError, InputTypeError, NotFittedError
+from probdmp.dmp import PUBLISHED, Configuration, Task, ViaPoint, condition_primitive, task_for
+from probdmp.errors import InputTypeError
+from probdmp.estimator.learned import HasPrimitive
 from probdmp.estimator.saving import write_learned
 from probdmp.execution import (
     GaussianTrajectory,
     OnlineExecution,
+    Sensor,
+    SensorNoise,
     TrackedTrajectory,
+    estimate_sensor_noise,
+    feedback_gains,
     roll_out,
+    sample_recordings,
     sample_trajectories,
     score_recordings,
     smooth_recording,
     task_of_recording,
     track_recording,
 )
-from probdmp.learning import FitReport, LearningOptions, fit_primitive
+from probdmp.learning import LearningOptions, fit_primitive
 
 __all__ = ["ProbabilisticDMP"]
 
 MOST_SAMPLES = 10_000
 
 
-class ProbabilisticDMP:
+class ProbabilisticDMP(HasPrimitive):
     """A probabilistic Dynamic Movement Primitive: learn a movement, roll it out, execute it with feedback, judge it.
 
     Parameters
@@ -53,6 +58,10 @@ class ProbabilisticDMP:
     goal_handling : what a commanded goal does to joint weights. `"condition"`: the movement changes with its end as the
         demonstrations say; `"attractor"`: all of it is drawn to the goal; `"blend"`: the former within their spread, the
         latter beyond.
+    coupling : whether the degrees of freedom of an execution are learned to vary together: `"full"`, `"none"`, or `"auto"`,
+        whichever makes demonstrations likelier given the others.
+    channels : names of sensor channels of the demonstrations, such as `["force"]`, that are learned with the movement: what
+        they should read at each phase, and how that varies with the movement. An associative skill memory.
 
     Attributes
     ----------
@@ -64,6 +73,8 @@ class ProbabilisticDMP:
     Wherever `start`, `goal`, `duration`, `dt` are not given, they are as learned; for recordings, the recording's own first
     row, length and dt, and the learned goal. Positions are in data units, times in seconds, arrays time first: (T, D).
     Bands of position and velocity hardly depend on dt; those of the acceleration, which is white, grow as 1 / sqrt(dt).
+    `sensors`, a list of what `probdmp.execution.sensors` has, says what observes an execution; unless given, the position of
+    every degree of freedom, with the noise of the demonstrations, and every learned channel.
     """
 
     def __init__(
@@ -78,6 +89,8 @@ class ProbabilisticDMP:
         alpha_z: float = 25.0,
         smoothing: float = 0.05,
         goal_handling: str = "blend",
+        coupling: str = "full",
+        channels: Sequence[str] = (),
     ) -> None:
         self.n_basis = n_basis
         self.weight_model = weight_model
@@ -88,6 +101,8 @@ class ProbabilisticDMP:
         self.alpha_z = alpha_z
         self.smoothing = smoothing
         self.goal_handling = goal_handling
+        self.coupling = coupling
+        self.channels = channels
 
     @classmethod
     def as_published(cls, n_basis: int = 30, *, forcing_noise: str = "predictive") -> Self:
@@ -99,21 +114,6 @@ class ProbabilisticDMP:
         """
         settings = asdict(PUBLISHED) | {"n_basis": n_basis, "forcing_noise": forcing_noise}
         return cls(weight_model="pooled", smoothing=0.05, **settings)
-
-    def get_params(self, deep: bool = True) -> dict[str, Any]:
-        """The constructor's arguments by name."""
-        return {name: getattr(self, name) for name in signature(type(self).__init__).parameters if name != "self"}
-
-    def set_params(self, **parameters: Any) -> Self:
-        """Change constructor's arguments by name."""
-        for name, value in parameters.items():
-            check_choice(name, "the name of a parameter", self.get_params())
-            setattr(self, name, value)
-        return self
-
-    def __repr__(self) -> str:
-        arguments = ", ".join(f"{name}={value!r}" for name, value in self.get_params().items())
-        return f"ProbabilisticDMP({arguments})"
 
     def fit(self, demonstrations: Recordings, dt: float | None = None) -> Self:
         """Learn from demonstrations, each with its own start, goal, duration and length.
@@ -129,9 +129,7 @@ class ProbabilisticDMP:
             If an argument or a demonstration cannot be used; the message names it and says what to do.
         """
         configuration = Configuration(**{field.name: getattr(self, field.name) for field in fields(Configuration)})
-        options = LearningOptions(self.weight_model, self.smoothing)
-        self.primitive_: Primitive
-        self.fit_report_: FitReport | None
+        options = LearningOptions(self.weight_model, self.smoothing, self.channels)
         recordings = as_demonstrations(demonstrations, dt)
         self.primitive_, self.fit_report_ = fit_primitive(recordings, configuration, options)
         self.taught_by_ = frozenset(recording.fingerprint for recording in recordings)
@@ -151,31 +149,41 @@ class ProbabilisticDMP:
 
     def track(
         self,
-        observations: Recording,
+        observations: Recording | Mapping[str, ArrayLike],
         dt: float | None = None,
         start: ArrayLike | None = None,
         goal: ArrayLike | None = None,
         duration: float | None = None,
         start_velocity: ArrayLike | None = None,
+        sensors: Sequence[Sensor] | None = None,
     ) -> TrackedTrajectory:
-        """Kalman filter over a recorded execution, (T, D), NaN where nothing was measured. Source: Algorithm 2."""
-        recording = self._recording(observations, dt)
+        """Kalman filter over a recorded execution. Source: Algorithm 2.
+
+        Parameters
+        ----------
+        observations : a Demonstration, with the columns and channels that the outputs of the sensors are named after; a (T, D)
+            array of positions; or (T, O) arrays by name of their sensors. NaN where nothing was measured.
+        """
+        array = self._array(sensors)
+        recording = self._recording(observations, dt, array)
         task = task_of_recording(self._learned(), recording, start, goal, duration, start_velocity)
-        return track_recording(self._learned(), task, recording)
+        return track_recording(self._learned(), task, recording, array)
 
     def smooth(
         self,
-        observations: Recording,
+        observations: Recording | Mapping[str, ArrayLike],
         dt: float | None = None,
         start: ArrayLike | None = None,
         goal: ArrayLike | None = None,
         duration: float | None = None,
         start_velocity: ArrayLike | None = None,
+        sensors: Sequence[Sensor] | None = None,
     ) -> GaussianTrajectory:
-        """The state at each time given the whole recorded execution, before and after."""
-        recording = self._recording(observations, dt)
+        """The state at each time given the whole recorded execution, before and after; arguments as for `track`."""
+        array = self._array(sensors)
+        recording = self._recording(observations, dt, array)
         task = task_of_recording(self._learned(), recording, start, goal, duration, start_velocity)
-        return smooth_recording(self._learned(), task, recording)
+        return smooth_recording(self._learned(), task, recording, array)
 
     def execute(
         self,
@@ -186,6 +194,8 @@ class ProbabilisticDMP:
         detector: FailureDetector | None = None,
         start_velocity: ArrayLike | None = None,
         on_alarm: str = "continue",
+        sensors: Sequence[Sensor] | None = None,
+        feedback: Sequence[str] | None = None,
     ) -> OnlineExecution:
         """An execution to be stepped tick by tick with what the sensors say. Source: Algorithm 2, ExecuteAndMonitor.
 
@@ -194,14 +204,39 @@ class ProbabilisticDMP:
         start : where it starts; unless given it is about where the demonstrations did, and the first observation tells.
         detector : judges the execution while it runs.
         on_alarm : `"continue"` or `"hold"`, what is commanded after an alarm; see `OnlineExecution`.
+        feedback : names of the sensors that modulate the command, all unless given; the others are only watched.
         """
         if not isinstance(detector, FailureDetector | None):
             raise InputTypeError("detector as a FailureDetector", f"{detector!r:.100}")
         start = np.full(self._learned().n_dof, np.nan) if start is None else start
         task = task_for(self._learned(), start, goal, duration, start_velocity)
-        return OnlineExecution(self._learned(), task, self._step(dt), detector, on_alarm)
+        given = getattr(detector, "sensors_", None) if sensors is None else sensors
+        return OnlineExecution(self._learned(), task, self._step(dt), detector, on_alarm, self._array(given), feedback)
 
-    def score_samples(self, executions: Recordings, dt: float | None = None, tasks: Sequence[Task] | None = None) -> FloatArray:
+    def feedback_gains(
+        self,
+        start: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
+        duration: float | None = None,
+        dt: float | None = None,
+        sensors: Sequence[Sensor] | None = None,
+    ) -> FloatArray:
+        """What a unit innovation of each output adds to the next command of `execute`: the paper's A K, (T - 1, D, 3, O) array.
+
+        The order is acceleration, velocity, position. Sensors are linear and have no gate; see
+        `probdmp.execution.feedback_gains`.
+        """
+        start = np.full(self._learned().n_dof, np.nan) if start is None else start
+        task = task_for(self._learned(), start, goal, duration)
+        return feedback_gains(self._learned(), task, self._step(dt), self._array(sensors))
+
+    def score_samples(
+        self,
+        executions: Recordings,
+        dt: float | None = None,
+        tasks: Sequence[Task] | None = None,
+        sensors: Sequence[Sensor] | None = None,
+    ) -> FloatArray:
         """Total log-likelihood of each recorded execution, (N,) array, nats, computed side by side.
 
         Parameters
@@ -210,7 +245,7 @@ class ProbabilisticDMP:
         """
         primitive, recordings = self._learned(), as_demonstrations(executions, self._step(dt))
         asked = tasks if tasks is not None else [task_of_recording(primitive, recording) for recording in recordings]
-        return score_recordings(primitive, asked, recordings)
+        return score_recordings(primitive, asked, recordings, self._array(sensors))
 
     def sample(
         self,
@@ -230,12 +265,24 @@ class ProbabilisticDMP:
         sensor_noise : whether positions are as a sensor would record them, or as they are.
         """
         task = task_for(self._learned(), start, goal, duration, start_velocity)
-        count = check_count(n_samples, "n_samples", most=MOST_SAMPLES)
-        try:
-            rng = np.random.default_rng(random_state)
-        except (TypeError, ValueError) as error:
-            raise InputTypeError("random_state as a whole number >= 0 or a Generator", f"{random_state!r:.100}") from error
+        count, rng = check_count(n_samples, "n_samples", most=MOST_SAMPLES), check_generator(random_state)
         return sample_trajectories(self._learned(), task, self._step(dt), count, rng, sensor_noise)
+
+    def sample_recordings(
+        self,
+        n_samples: int = 1,
+        start: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
+        duration: float | None = None,
+        dt: float | None = None,
+        start_velocity: ArrayLike | None = None,
+        sensors: Sequence[Sensor] | None = None,
+        random_state: int | np.random.Generator | None = None,
+    ) -> list[Demonstration]:
+        """Draw executions as sensors would record them; positions that none of them measures are missing."""
+        task = task_for(self._learned(), start, goal, duration, start_velocity)
+        count, rng = check_count(n_samples, "n_samples", most=MOST_SAMPLES), check_generator(random_state)
+        return sample_recordings(self._learned(), task, self._step(dt), count, rng, self._array(sensors))
 
     def condition(self, points: Sequence[ViaPoint]) -> Self:
         """The same movement through via-points; needs `weight_uncertainty="joint"`, the default.
@@ -257,27 +304,31 @@ class ProbabilisticDMP:
         stds : (D,) array, data units: standard deviation of each position sensor, > 0.
         """
         learned = self._learned()
-        checked = check_array(stds, "stds", (learned.n_dof,))
-        if np.any(checked <= 0):
-            raise InputError("stds > 0", f"{checked.min():g}")
-        return self._with(replace(learned, observation_variances=checked**2))
+        return self._with(replace(learned, observation_variances=check_noise_stds(stds, learned.n_dof) ** 2))
+
+    def learn_sensor_noise(
+        self,
+        sensors: Sequence[Sensor],
+        demonstrations: Recordings,
+        dt: float | None = None,
+        tasks: Sequence[Task] | None = None,
+        covariance: str = "as_given",
+    ) -> SensorNoise:
+        """The noise R of each sensor, by expectation maximisation over demonstrations that all of them have recorded.
+
+        Parameters
+        ----------
+        sensors : with a first guess of their noise.
+        tasks : what each was asked to do. Unless given, nothing but the length of the recording is told: where it starts is
+            for the sensors to say.
+        covariance : `"as_given"`: a diagonal R stays diagonal; `"full"`, `"diagonal"`, or `"auto"`: the likelier of the two on
+            demonstrations that were left out, sensor by sensor.
+        """
+        primitive, recordings = self._learned(), as_demonstrations(demonstrations, self._step(dt))
+        unknown = np.full(primitive.n_dof, np.nan)
+        asked = tasks if tasks is not None else [task_of_recording(primitive, r, start=unknown) for r in recordings]
+        return estimate_sensor_noise(primitive, sensors, asked, recordings, covariance)
 
     def save(self, path: str | Path, detector: FailureDetector | None = None) -> None:
         """Write a model file, atomically, with the detector if given."""
         write_learned(path, {"": (self._learned(), self.get_params())}, detector)
-
-    def _learned(self) -> Primitive:
-        if not hasattr(self, "primitive_"):
-            raise NotFittedError("a learned primitive", "one that was not fitted", "Call fit(demonstrations) first.")
-        return self.primitive_
-
-    def _with(self, primitive: Primitive) -> Self:
-        other = type(self)(**self.get_params())
-        other.primitive_, other.fit_report_ = primitive, None
-        return other
-
-    def _step(self, dt: float | None) -> float:
-        return self._learned().dt if dt is None else check_seconds(dt, "dt")
-
-    def _recording(self, observations: Recording, dt: float | None) -> Demonstration:
-        return as_demonstrations([observations], self._step(dt))[0]

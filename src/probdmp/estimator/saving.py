@@ -47,5 +47,6 @@ def _identities(primitives: Mapping[str, Primitive]) -> set[str]:
 
 
 def _plain(parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Numbers of NumPy as numbers of Python, which a model file can hold."""
-    return {name: value.item() if isinstance(value, np.generic) else value for name, value in parameters.items()}
+    """Numbers of NumPy as numbers of Python, and tuples as lists, which a model file can hold."""
+    as_numbers = {name: value.item() if isinstance(value, np.generic) else value for name, value in parameters.items()}
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in as_numbers.items()}

@@ -1,32 +1,63 @@
 """Running a primitive: rollout, tracking, smoothing and sampling of recordings, online execution."""
 
+from probdmp.execution.feedback_gains import feedback_gains
 from probdmp.execution.online import ExecutionStep, Judgement, Monitor, Observed, OnlineExecution
+from probdmp.execution.plain_sensors import sensors_as_plain, sensors_from_plain
+from probdmp.execution.planar_arm import PlanarArm, planar_arm_sensor
+from probdmp.execution.readings import readings_of, recording_of_readings
 from probdmp.execution.recordings import (
     check_tasks,
     filter_recordings,
     score_recordings,
     smooth_recording,
+    smooth_recordings,
     task_of_recording,
     track_recording,
 )
-from probdmp.execution.rollout import position_covariances, roll_out, sample_trajectories
-from probdmp.execution.trajectory import GaussianTrajectory, TrackedTrajectory
+from probdmp.execution.rollout import position_covariances, roll_out, sample_recordings, sample_states, sample_trajectories
+from probdmp.execution.sensor_array import SensorArray
+from probdmp.execution.sensor_noise import SensorNoise, estimate_sensor_noise
+from probdmp.execution.sensor_reports import SensorCounts, SensorTrack
+from probdmp.execution.sensors import ChannelSensor, LinearSensor, NonlinearSensor, Sensor, default_sensors, state_sensor
+from probdmp.execution.trajectory import GaussianChannel, GaussianTrajectory, TrackedTrajectory
 
 __all__ = [
+    "ChannelSensor",
     "ExecutionStep",
+    "GaussianChannel",
     "GaussianTrajectory",
     "Judgement",
+    "LinearSensor",
     "Monitor",
+    "NonlinearSensor",
     "Observed",
     "OnlineExecution",
+    "PlanarArm",
+    "Sensor",
+    "SensorArray",
+    "SensorCounts",
+    "SensorNoise",
+    "SensorTrack",
     "TrackedTrajectory",
     "check_tasks",
+    "default_sensors",
+    "estimate_sensor_noise",
+    "feedback_gains",
     "filter_recordings",
+    "planar_arm_sensor",
     "position_covariances",
+    "readings_of",
+    "recording_of_readings",
     "roll_out",
+    "sample_recordings",
+    "sample_states",
     "sample_trajectories",
     "score_recordings",
+    "sensors_as_plain",
+    "sensors_from_plain",
     "smooth_recording",
+    "smooth_recordings",
+    "state_sensor",
     "task_of_recording",
     "track_recording",
 ]

@@ -1,7 +1,7 @@
 """Filter, smoother, rollout and samples of executions whose parameters are constant and unknown.
 
-Each observation says something about the parameters, hence about all of the movement, past and future. Degrees of freedom
-vary together, so what one of them shows is used for the others too.
+Each observation says something about the parameters, hence about all of the movement, past and future. All signals vary
+together, so what one of them shows is used for the others too.
 """
 
 from collections.abc import Iterator
@@ -9,14 +9,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from probdmp.checks import FloatArray
-from probdmp.dmp import Primitive
-from probdmp.dmp.joint_model import JointExecutions, JointModel, position_designs, state_designs
+from probdmp.checks import BoolArray, FloatArray
+from probdmp.dmp.joint_model import JointExecutions, JointModel, state_designs
 from probdmp.dmp.transformation_system import POSITION
+from probdmp.execution.sensor_array import SensorArray
 from probdmp.gaussian import (
     AugmentedUpdate,
     Deviation,
     GaussianSequence,
+    block_diagonal,
     linear_moments,
     no_deviation,
     observe_deviation,
@@ -30,6 +31,7 @@ __all__ = [
     "joint_position_covariances",
     "roll_out_joint",
     "sample_joint",
+    "smooth_all_joint",
     "smooth_joint",
     "start_deviation",
     "state_moments",
@@ -41,13 +43,15 @@ class FilteredRecordings(NamedTuple):
     """What the filter says about N recordings, in T times."""
 
     filtered: GaussianSequence
-    """The states given the observations up to and including each time: (T, N, D, 3) and (T, N, D, 3, 3)."""
+    """The states of all signals given the observations up to and including each time: (T, N, S, 3) and (T, N, S, 3, 3)."""
     innovations: FloatArray
-    """(T, N, D, 1) array; NaN where not seen."""
+    """(T, N, O) array; NaN where not seen."""
     innovation_covariances: FloatArray
-    """(T, N, D, 1, 1) array: of each degree of freedom by itself."""
+    """(T, N, O, O) array."""
+    fused: BoolArray
+    """(T, N, O) array: what was seen and believed."""
     log_likelihoods: FloatArray
-    """(T, N, D) array, nats: the share of each degree of freedom in the log-likelihood of a time given the past."""
+    """(T, N, O) array, nats: the share of each output in the log-likelihood of a time given the past."""
 
 
 class _Now(NamedTuple):
@@ -57,33 +61,49 @@ class _Now(NamedTuple):
     deviation: Deviation
 
 
-def filter_joint(primitive: Primitive, executions: JointExecutions, observed: FloatArray) -> FilteredRecordings:
-    """Take in recordings, (T, N, D), NaN where nothing was measured."""
+def filter_joint(executions: JointExecutions, observed: FloatArray, array: SensorArray) -> FilteredRecordings:
+    """Take in recordings, (T, N, O), NaN where nothing was measured."""
     columns = []
-    for now, rows, update in _filtered(primitive, executions, observed):
+    for now, rows, update in _filtered(executions, observed, array):
         seen = update.seen
-        variances = np.diagonal(seen.innovation_covariance, axis1=-2, axis2=-1)
-        columns.append(
-            (*state_moments(*now, rows), seen.innovation[..., None], variances[..., None, None], seen.log_likelihoods)
-        )
-    means, covariances, innovations, variances, log_likelihoods = (np.stack(c) for c in zip(*columns, strict=True))
-    return FilteredRecordings(GaussianSequence(means, covariances), innovations, variances, log_likelihoods)
+        of_outputs = (array.flat(seen.innovation), array.flat_covariances(seen.innovation_covariance))
+        columns.append((*state_moments(*now, rows), *of_outputs, array.flat(seen.fused), array.flat(seen.log_likelihoods)))
+    means, covariances, *rest = (np.stack(column) for column in zip(*columns, strict=True))
+    return FilteredRecordings(GaussianSequence(means, covariances), *rest)
 
 
-def smooth_joint(primitive: Primitive, executions: JointExecutions, observed: FloatArray) -> GaussianSequence:
-    """All states given all of the recordings, (T, N, D): (T, N, D, 3) and (T, N, D, 3, 3)."""
+def smooth_joint(executions: JointExecutions, observed: FloatArray, array: SensorArray) -> GaussianSequence:
+    """All states given all of the recordings, (T, N, O): (T, N, S, 3) and (T, N, S, 3, 3)."""
     updates, model = [], executions.model
-    for now, _, update in _filtered(primitive, executions, observed):
+    for now, _, update in _filtered(executions, observed, array):
         updates.append(update)
         model = now.model
-    smoothed = smooth_deviations(updates, executions.system.transition)
+    smoothed = smooth_deviations(updates, executions.system.grouped(array.is_coupled)[0])
     moments = [state_moments(model, d, rows) for d, rows in zip(smoothed, executions.rows, strict=True)]
     return GaussianSequence(*(np.stack(m) for m in zip(*moments, strict=True)))
 
 
+def smooth_all_joint(
+    executions: JointExecutions, observed: FloatArray, array: SensorArray
+) -> tuple[float, FloatArray, FloatArray]:
+    """Log-likelihood of all recordings, nats, and moments of the states of all signals together given all of each.
+
+    Returns
+    -------
+    The means are (T, N, 3 S), the covariances (T, N, 3 S, 3 S).
+    """
+    steps = [(now, update) for now, _, update in _filtered(executions, observed, array)]
+    smoothed = smooth_deviations([update for _, update in steps], executions.system.grouped(array.is_coupled)[0])
+    last = steps[-1][0].model
+    moments = [all_moments(last, d, rows) for d, rows in zip(smoothed, executions.rows, strict=True)]
+    log_likelihood = float(sum(update.seen.log_likelihoods.sum() for _, update in steps))
+    means, covariances = (np.stack(m) for m in zip(*moments, strict=True))
+    return log_likelihood, means, covariances
+
+
 def roll_out_joint(executions: JointExecutions) -> GaussianSequence:
-    """All states given what is known before they begin: (T, N, D, 3) and (T, N, D, 3, 3)."""
-    moments, deviation, noise = [], start_deviation(executions.model), executions.system.noise
+    """All states given what is known before they begin: (T, N, S, 3) and (T, N, S, 3, 3)."""
+    moments, deviation, noise = [], start_deviation(executions.model, False), executions.system.noise
     for t, rows in enumerate(executions.rows):
         if t > 0:
             deviation = predict_deviation(deviation, executions.system.transition, noise)
@@ -92,70 +112,100 @@ def roll_out_joint(executions: JointExecutions) -> GaussianSequence:
 
 
 def joint_position_covariances(executions: JointExecutions) -> FloatArray:
-    """Of `roll_out_joint`, what degrees of freedom share too: (T, N, D, D) array, data units squared."""
-    model, deviation = executions.model, start_deviation(executions.model)
+    """Of `roll_out_joint`, what signals share too: (T, N, S, S) array, units of the signals multiplied."""
+    model, deviation = executions.model, start_deviation(executions.model, False)
     covariances = []
     for t, rows in enumerate(executions.rows):
         if t > 0:
             deviation = predict_deviation(deviation, executions.system.transition, executions.system.noise)
-        shared = linear_moments(model.belief, position_designs(model, rows)[1])[1]
+        designs = state_designs(model, rows[..., [POSITION], :])[1][..., 0, :]
+        shared = linear_moments(model.belief, designs)[1]
         own = deviation.covariance[..., POSITION, POSITION]  # nothing was observed, so deviations owe nothing to z
         covariances.append(shared + own[..., None] * np.eye(own.shape[-1]))
     return np.stack(covariances)
 
 
-def start_deviation(model: JointModel) -> Deviation:
+def start_deviation(model: JointModel, are_coupled: bool) -> Deviation:
     """An execution begins where its parameters say."""
-    return no_deviation(model.means.shape[:-1], 3, model.factors.shape[-1])
+    *batch, n_signals, _ = model.means.shape
+    groups, size = (1, 3 * n_signals) if are_coupled else (n_signals, 3)
+    return no_deviation((*batch, groups), size, model.factors.shape[-1])
 
 
 def update_joint(
-    model: JointModel, deviation: Deviation, rows: FloatArray, measured: FloatArray, variances: FloatArray
+    model: JointModel, deviation: Deviation, rows: FloatArray, measured: FloatArray, array: SensorArray
 ) -> AugmentedUpdate:
-    """Condition on positions (*batch, D) of one time.
+    """Condition on the observations (*batch, O) of one time.
 
     Parameters
     ----------
     rows : (*batch, 3, N + 3) array, see `state_rows`.
-    variances : R, (D,) array.
     """
-    offsets, designs = position_designs(model, rows)
-    return observe_deviation(model.belief, deviation, measured - offsets, designs, POSITION, variances)
+    kinds, n_groups = array.kinds, array.matrix.shape[0]
+    offsets, designs = state_designs(model, rows[..., kinds, :])
+
+    def predicted() -> tuple[FloatArray, FloatArray]:
+        return all_moments(model, deviation, rows)
+
+    values, sensors, noise, believed = array.look(measured, predicted)
+    # Only the kinds of states that are seen at all: the others have columns of zeros in C.
+    shape = (*sensors.shape[:-1], -1, 3)
+    seen = sensors.reshape(shape)[..., kinds].reshape(*sensors.shape[:-1], -1)
+    batch = offsets.shape[:-2]
+    known = np.matmul(seen, offsets.reshape(*batch, n_groups, -1, 1))[..., 0]
+    of_z = seen @ designs.reshape(*batch, n_groups, seen.shape[-1], designs.shape[-1])
+    return observe_deviation(model.belief, deviation, values - known, of_z, sensors, noise, believed)
 
 
 def state_moments(model: JointModel, deviation: Deviation, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Mean (*batch, D, 3) and covariance (*batch, D, 3, 3) of the states of one time."""
+    """Mean (*batch, S, 3) and covariance (*batch, S, 3, 3) of the states of one time."""
     offsets, designs = state_designs(model, rows)
-    belief = model.belief
+    belief, own = model.belief, deviation.covariance
     shared = belief._replace(mean=belief.mean[..., None, :], covariance=belief.covariance[..., None, :, :])
-    means, covariances = linear_moments(shared, designs + deviation.loading)
-    return offsets + deviation.offset + means, covariances + deviation.covariance
+    means, covariances = linear_moments(shared, designs + deviation.loading.reshape(designs.shape))
+    if own.shape[-1] > 3:  # one group of all signals
+        n_signals = offsets.shape[-2]
+        blocks = own.reshape(*own.shape[:-3], n_signals, 3, n_signals, 3)
+        own = np.moveaxis(blocks[..., np.arange(n_signals), :, np.arange(n_signals), :], 0, -3)
+    return offsets + deviation.offset.reshape(offsets.shape) + means, covariances + own
+
+
+def all_moments(model: JointModel, deviation: Deviation, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The same of the states of all signals together: (*batch, 3 S) and (*batch, 3 S, 3 S)."""
+    offsets, designs = state_designs(model, rows)
+    batch, r = offsets.shape[:-2], designs.shape[-1]
+    means, covariances = linear_moments(
+        model.belief, (designs + deviation.loading.reshape(designs.shape)).reshape(*batch, -1, r)
+    )
+    return (offsets + deviation.offset.reshape(offsets.shape)).reshape(*batch, -1) + means, covariances + block_diagonal(
+        deviation.covariance
+    )
 
 
 def sample_joint(executions: JointExecutions, n_samples: int, rng: np.random.Generator) -> FloatArray:
-    """Draw paths of the first execution, (n_samples, T, D) array, data units."""
+    """Draw the states of the first execution, (n_samples, T, S, 3) array."""
     (means, factors, belief), rows, system = executions
     eigenvalues, vectors = np.linalg.eigh(belief.covariance[0])
     drawn = rng.standard_normal((n_samples, len(eigenvalues))) * np.sqrt(np.maximum(eigenvalues, 0.0))
     unknown = means[0] + np.einsum("dnr,sr->sdn", factors[0], belief.mean[0] + drawn @ vectors.T)
-    paths = np.asarray(np.einsum("tn,sdn->std", rows[:, 0, POSITION], unknown, optimize=True))
-    inputs = rng.standard_normal(paths.shape) * np.sqrt(system.variances[0])
+    states = np.asarray(np.einsum("tkn,sdn->stdk", rows[:, 0], unknown, optimize=True))
+    inputs = rng.standard_normal(states.shape[:-1]) * np.sqrt(system.variances[0])
     deviations = np.zeros((*inputs[:, 0].shape, 3))
-    for t in range(1, paths.shape[1]):  # eps[t-1] drives d[t-1] to d[t]
+    for t in range(1, states.shape[1]):  # eps[t-1] drives d[t-1] to d[t]
         deviations = deviations @ system.transition[0, 0].T + inputs[:, t - 1, :, None] * system.input_vector[0, 0]
-        paths[:, t] += deviations[..., POSITION]
-    return paths
+        states[:, t] += deviations
+    return states
 
 
 def _filtered(
-    primitive: Primitive, executions: JointExecutions, observed: FloatArray
+    executions: JointExecutions, observed: FloatArray, array: SensorArray
 ) -> Iterator[tuple[_Now, FloatArray, AugmentedUpdate]]:
     """What is known after each time, its rows, and what it has shown."""
-    (model, _, system), noise = executions, executions.system.noise
-    deviation = start_deviation(model)
+    model, (transition, noise) = executions.model, executions.system.grouped(array.is_coupled)
+    deviation = start_deviation(model, array.is_coupled)
     for t, (rows, measured) in enumerate(zip(executions.rows, observed, strict=True)):
         if t > 0:
-            deviation = predict_deviation(deviation, system.transition, noise)
-        update = update_joint(model, deviation, rows, measured, primitive.observation_variances)
+            deviation = predict_deviation(deviation, transition, noise)
+        update = update_joint(model, deviation, rows, measured, array)
         model, deviation = model._replace(belief=update.seen.belief), update.deviation
         yield _Now(model, deviation), rows, update

@@ -5,20 +5,32 @@ or taken as learned (the goal). Source: Meier & Schaal 2016, Algorithm 2.
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from probdmp.checks import FloatArray, shape_text
-from probdmp.demonstrations import Demonstration, stack_positions
-from probdmp.dmp import Primitive, Task, linear_gaussian_model, stack_tasks, task_for
-from probdmp.dmp.joint_model import joint_executions
+from probdmp.demonstrations import Demonstration
+from probdmp.dmp import Primitive, Task, stack_tasks, task_for
 from probdmp.errors import InputError, InputTypeError
-from probdmp.execution.joint_filtering import FilteredRecordings, filter_joint, smooth_joint
+from probdmp.execution.inference import INFERENCES, Inference
+from probdmp.execution.joint_filtering import FilteredRecordings
+from probdmp.execution.readings import stack_readings
+from probdmp.execution.rollout import trajectory_parts
+from probdmp.execution.sensor_array import SensorArray
 from probdmp.execution.trajectory import GaussianTrajectory, TrackedTrajectory
-from probdmp.gaussian import filter_sequence, smooth_sequence
+from probdmp.gaussian import GaussianSequence
 
-__all__ = ["check_tasks", "filter_recordings", "score_recordings", "smooth_recording", "task_of_recording", "track_recording"]
+__all__ = [
+    "check_tasks",
+    "filter_recordings",
+    "score_recordings",
+    "smooth_recording",
+    "smooth_recordings",
+    "task_of_recording",
+    "track_recording",
+]
 
 BATCH_SIZE = 256
 """Recordings that are filtered side by side; more would only cost memory."""
@@ -46,45 +58,46 @@ def task_of_recording(
     return task_for(primitive, start, goal, recording.duration if duration is None else duration, start_velocity)
 
 
-def track_recording(primitive: Primitive, task: Task, recording: Demonstration) -> TrackedTrajectory:
-    """Kalman filter over a recorded execution; NaN marks what was not measured, and is predicted."""
-    forward = filter_recordings(primitive, [task], [recording])
+def track_recording(
+    primitive: Primitive, task: Task, recording: Demonstration, sensors: SensorArray | None = None
+) -> TrackedTrajectory:
+    """Kalman filter over a recorded execution; NaN marks what was not measured, and is predicted.
+
+    Parameters
+    ----------
+    sensors : what has measured; positions and learned channels unless given.
+    """
+    array = SensorArray(primitive) if sensors is None else sensors
+    forward = filter_recordings(primitive, [task], [recording], array)
     contributions = forward.log_likelihoods[:, 0]
     return TrackedTrajectory(
-        times=recording.times,
-        means=forward.filtered.means[:, 0],
-        covariances=forward.filtered.covariances[:, 0],
-        names=primitive.names,
-        units=primitive.units,
+        **trajectory_parts(primitive, recording.times, forward.filtered),
         log_likelihoods=contributions.sum(axis=-1),
         contributions=contributions,
-        innovations=forward.innovations[:, 0, :, 0],
-        innovation_variances=forward.innovation_covariances[:, 0, :, 0, 0],
+        innovations=forward.innovations[:, 0],
+        innovation_covariances=forward.innovation_covariances[:, 0],
+        fused=forward.fused[:, 0],
+        array=array,
     )
 
 
-def smooth_recording(primitive: Primitive, task: Task, recording: Demonstration) -> GaussianTrajectory:
-    """The state at each time given the whole recording, before and after."""
-    _check_recordings(primitive, [recording])
-    if primitive.configuration.weight_uncertainty == "joint":
-        executions = joint_executions(primitive, stack_tasks([task]), np.array([recording.dt]), recording.n_samples)
-        means, covariances = smooth_joint(primitive, executions, recording.positions[:, None])
-        return GaussianTrajectory(recording.times, means[:, 0], covariances[:, 0], primitive.names, primitive.units)
-    model = linear_gaussian_model(primitive, task, recording.dt, recording.n_samples)
-    smoothed = smooth_sequence(model, recording.positions[..., None])
-    return GaussianTrajectory(recording.times, *smoothed, primitive.names, primitive.units)
+def smooth_recording(
+    primitive: Primitive, task: Task, recording: Demonstration, sensors: SensorArray | None = None
+) -> GaussianTrajectory:
+    """The state at each time given the whole recording, before and after; arguments as for `track_recording`."""
+    array = SensorArray(primitive) if sensors is None else sensors
+    smoothed = smooth_recordings(primitive, [task], [recording], array)
+    return GaussianTrajectory(**trajectory_parts(primitive, recording.times, smoothed))
 
 
-def score_recordings(primitive: Primitive, tasks: Sequence[Task], recordings: Sequence[Demonstration]) -> FloatArray:
+def score_recordings(
+    primitive: Primitive, tasks: Sequence[Task], recordings: Sequence[Demonstration], sensors: SensorArray | None = None
+) -> FloatArray:
     """Total log-likelihood of each recording given its task, (N,) array, nats."""
     check_tasks(tasks, recordings)
-    batches = range(0, len(recordings), BATCH_SIZE)
-    return np.concatenate(
-        [
-            filter_recordings(primitive, tasks[i : i + BATCH_SIZE], recordings[i : i + BATCH_SIZE]).log_likelihoods.sum((0, -1))
-            for i in batches
-        ]
-    )
+    batches = [slice(i, i + BATCH_SIZE) for i in range(0, len(recordings), BATCH_SIZE)]
+    forward = [filter_recordings(primitive, tasks[batch], recordings[batch], sensors) for batch in batches]
+    return np.concatenate([part.log_likelihoods.sum((0, -1)) for part in forward])
 
 
 def check_tasks(tasks: Sequence[Task], recordings: Sequence[Demonstration]) -> Sequence[Task]:
@@ -99,15 +112,34 @@ def check_tasks(tasks: Sequence[Task], recordings: Sequence[Demonstration]) -> S
     return tasks
 
 
-def filter_recordings(primitive: Primitive, tasks: Sequence[Task], recordings: Sequence[Demonstration]) -> FilteredRecordings:
-    """Kalman filter over N recordings side by side: arrays (T, N, D, …); after the end of a recording nothing is seen."""
+def filter_recordings(
+    primitive: Primitive, tasks: Sequence[Task], recordings: Sequence[Demonstration], sensors: SensorArray | None = None
+) -> FilteredRecordings:
+    """Kalman filter over N recordings side by side: arrays (T, N, …); after the end of a recording nothing is seen."""
+    inference = INFERENCES[primitive.configuration.weight_uncertainty]
+    return inference.filter(*_observed(inference, primitive, tasks, recordings, sensors))
+
+
+def smooth_recordings(
+    primitive: Primitive, tasks: Sequence[Task], recordings: Sequence[Demonstration], sensors: SensorArray | None = None
+) -> GaussianSequence:
+    """Smoother over N recordings side by side: the states of all signals, (T, N, S, 3), and their covariances."""
+    inference = INFERENCES[primitive.configuration.weight_uncertainty]
+    return inference.smooth(*_observed(inference, primitive, tasks, recordings, sensors))
+
+
+def _observed(
+    inference: Inference,
+    primitive: Primitive,
+    tasks: Sequence[Task],
+    recordings: Sequence[Demonstration],
+    sensors: SensorArray | None,
+) -> tuple[Any, FloatArray, SensorArray]:
+    """The executions before they begin, what was measured, (T, N, O), and by what."""
     _check_recordings(primitive, recordings)
-    observed = stack_positions(recordings)
-    dts = np.array([r.dt for r in recordings])
-    if primitive.configuration.weight_uncertainty == "joint":
-        return filter_joint(primitive, joint_executions(primitive, stack_tasks(tasks), dts, len(observed)), observed)
-    forward = filter_sequence(linear_gaussian_model(primitive, stack_tasks(tasks), dts, len(observed)), observed[..., None])
-    return FilteredRecordings(forward.filtered, forward.innovations, forward.innovation_covariances, forward.log_likelihoods)
+    array = SensorArray(primitive) if sensors is None else sensors
+    measured, dts = stack_readings(array, recordings), np.array([r.dt for r in recordings])
+    return inference.prepare(primitive, stack_tasks(tasks), dts, len(measured)), measured, array
 
 
 def _check_recordings(primitive: Primitive, recordings: Sequence[Demonstration]) -> None:

@@ -1,16 +1,44 @@
 """Trajectories with their uncertainty."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
 
 import numpy as np
 
-from probdmp.checks import FloatArray, freeze_arrays
+from probdmp.checks import BoolArray, FloatArray, freeze_arrays
+from probdmp.dmp import Primitive
 from probdmp.dmp.transformation_system import ACCELERATION, POSITION, VELOCITY
+from probdmp.execution.sensor_array import SensorArray
+from probdmp.execution.sensor_reports import SensorTrack, sensor_tracks
 
-__all__ = ["HALF_BAND", "GaussianTrajectory", "TrackedTrajectory"]
+__all__ = ["HALF_BAND", "GaussianChannel", "GaussianTrajectory", "TrackedTrajectory", "channels_of"]
 
 HALF_BAND = 1.96
 """Standard deviations on either side of the mean that hold 95 % of a Gaussian."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GaussianChannel:
+    """A Gaussian over the value of a sensor channel at each time."""
+
+    means: FloatArray
+    """(T,) array, units of the channel."""
+    stds: FloatArray
+    """(T,) array, units of the channel."""
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
+
+
+def channels_of(primitive: Primitive, means: FloatArray, covariances: FloatArray) -> dict[str, GaussianChannel]:
+    """The channels, by name, from the states of all signals, (T, S, 3) and (T, S, 3, 3)."""
+    d = primitive.n_dof
+    values, variances = means[:, d:, POSITION], covariances[:, d:, POSITION, POSITION]
+    return {
+        name: GaussianChannel(values[:, i].copy(), np.sqrt(np.maximum(variances[:, i], 0.0)))
+        for i, name in enumerate(primitive.channel_names)
+    }
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,9 +55,12 @@ class GaussianTrajectory:
     """(D) names of the degrees of freedom."""
     units: str
     """Unit of the positions, free text."""
+    channels: Mapping[str, GaussianChannel] = field(default_factory=dict, kw_only=True)
+    """What is expected of sensor channels that were learned with the movement, by name."""
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
+        object.__setattr__(self, "channels", MappingProxyType(dict(self.channels)))
 
     @property
     def positions(self) -> FloatArray:
@@ -67,18 +98,36 @@ class GaussianTrajectory:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackedTrajectory(GaussianTrajectory):
-    """What the Kalman filter says about a recorded execution; means and covariances are those after each update."""
+    """What the Kalman filter says about a recorded execution; means and covariances are those after each update.
+
+    Outputs are what the sensors measure, O numbers: the positions of the degrees of freedom, and the learned channels, unless
+    other sensors were given.
+    """
 
     log_likelihoods: FloatArray
-    """(T,) array, nats: density of what was seen at each step given the past; 0 where nothing was."""
+    """(T,) array, nats: density of what was seen and believed at each step given the past; 0 where nothing was."""
     contributions: FloatArray
-    """(T, D) array, nats: the share of each degree of freedom in the log-likelihood."""
+    """(T, O) array, nats: the share of each output in the log-likelihood."""
     innovations: FloatArray
-    """(T, D) array, data units: measured minus predicted; NaN where not seen."""
-    innovation_variances: FloatArray
-    """(T, D) array, data units squared: variance of the innovations, seen or not."""
+    """(T, O) array, units of the outputs: measured minus predicted; NaN where not seen."""
+    innovation_covariances: FloatArray
+    """(T, O, O) array, units of the outputs multiplied: covariance of the innovations, seen or not."""
+    fused: BoolArray
+    """(T, O) array: what was seen and believed."""
+    array: SensorArray
+    """The sensors."""
 
     @property
-    def innovation_covariances(self) -> FloatArray:
-        """(T, D, D) array, data units squared: diagonal; with joint weights, what degrees of freedom share is left out."""
-        return self.innovation_variances[..., None] * np.eye(len(self.names))
+    def innovation_variances(self) -> FloatArray:
+        """(T, O) array, units of the outputs squared."""
+        return np.diagonal(self.innovation_covariances, axis1=-2, axis2=-1)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """(O) names of the outputs."""
+        return self.array.outputs
+
+    @property
+    def sensors(self) -> dict[str, SensorTrack]:
+        """By name of each sensor: its innovations, how surprising they were, what was rejected."""
+        return sensor_tracks(self.array, self.innovations, self.innovation_covariances, self.fused)
