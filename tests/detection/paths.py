@@ -25,6 +25,19 @@ def random_path_model(rng, n_dof):
     return PathModel(means, covariance, gains, rng.uniform(0.005, 0.02, n_dof) ** 2)
 
 
+def random_felt_model(rng, n_dof, n_channels=1):
+    """The same with channels, about one range from zero at their start, that vary with the paths."""
+    n_signals = n_dof + n_channels
+    waves = np.column_stack([np.ones(TICKS + 1), WAVES])
+    factors = np.kron(waves, np.eye(n_signals)).reshape(TICKS + 1, n_signals, -1)
+    factors[:, :n_dof, :n_signals] = 0.0  # displacements begin at zero
+    size = factors.shape[-1]
+    covariance = np.einsum("mdi,ij,nej->mdne", factors, random_covariance(rng, (), size, size) * 0.05**2, factors)
+    means = np.einsum("mdi,i->md", factors, rng.standard_normal(size) / 2)
+    gains = rng.standard_normal((n_signals, n_dof)) * PHASES[:, None, None]
+    return PathModel(means, covariance, gains, rng.uniform(0.005, 0.02, n_signals) ** 2)
+
+
 def random_paths(model, rng, n, length):
     """(n, length, D) executions drawn from the model, with noise; those that go on after the end stay there."""
     m, d = model.means.shape

@@ -15,7 +15,7 @@ from probdmp.detection.monitoring import LikelihoodMonitor, replay
 from probdmp.detection.thresholds import PaperThreshold
 from probdmp.dmp import task_for
 from probdmp.errors import InputError, InputTypeError, NotFittedError
-from probdmp.execution import Observed, OnlineExecution, sample_trajectories, task_of_recording
+from probdmp.execution import Observed, OnlineExecution, SensorArray, sample_trajectories, task_of_recording
 
 LIKELIHOODS = ("per_step", "cumulative")
 
@@ -239,7 +239,7 @@ def ticks(values):
 
 
 def monitored(values, minimum=-1.0):
-    monitor = LikelihoodMonitor(make_primitive(np.random.default_rng(0), 1), "per_step", PaperThreshold(minimum))
+    monitor = LikelihoodMonitor(SensorArray(make_primitive(np.random.default_rng(0), 1)), "per_step", PaperThreshold(minimum))
     ratios = [monitor.update(observed) for observed in ticks(values)]
     return monitor.verdict, ratios
 
@@ -299,7 +299,8 @@ def test_a_monitor_serves_one_execution(learned, letters):
 def test_replay_shows_what_an_online_execution_shows(learned, letters):
     primitive, recordings = learned.primitive_, letters["s"][4:]
     tasks = [task_of_recording(primitive, r) for r in recordings]
-    for task, recording, shown in zip(tasks, recordings, replay(primitive, tasks, recordings), strict=True):
+    shown_of_each = replay(primitive, tasks, recordings, SensorArray(primitive))
+    for task, recording, shown in zip(tasks, recordings, shown_of_each, strict=True):
         online = OnlineExecution(primitive, task, recording.dt)
         observed = list(shown)
         assert len(observed) == recording.n_samples
@@ -307,6 +308,7 @@ def test_replay_shows_what_an_online_execution_shows(learned, letters):
             step = online.step(position)
             assert (o.step, o.time) == (t, t * recording.dt)
             assert o.phase == pytest.approx(step.phase, rel=1e-12)
+            np.testing.assert_array_equal(o.signals, position)
             np.testing.assert_allclose(o.innovations, step.innovations, atol=1e-9)
 
 

@@ -11,9 +11,9 @@ from probdmp.detection.phase_clock import LONGEST_GAP, TICKS, PhaseClock
 DURATION = 1.7
 
 
-def run(values, dt, duration=DURATION):
-    """All ticks of samples (T, D), and the sample at which each came."""
-    clock = PhaseClock(values.shape[1], duration, dt)
+def run(values, dt, usual_gaps=None):
+    """All ticks of samples (T, S), which are usually `dt` apart, and the sample at which each came."""
+    clock = PhaseClock(np.full(values.shape[1], dt) if usual_gaps is None else np.asarray(usual_gaps), DURATION, dt)
     return [(tick, t) for t, row in enumerate(values) for tick in clock.advance(t * dt, row)]
 
 
@@ -71,7 +71,7 @@ def test_a_tick_waits_for_the_next_sample_and_no_longer(seed, dt):
 @pytest.mark.parametrize("gap", [2, 3, 4, 10])
 def test_short_gaps_are_bridged_and_long_ones_are_not(dt, gap):
     """A gap of so many ticks between two samples, from tick 40 on."""
-    clock, ticks = PhaseClock(1, DURATION, dt), []
+    clock, ticks = PhaseClock(np.array([dt]), DURATION, dt), []
     for t in range(round(DURATION / dt) + 1):
         at = t * dt * TICKS / DURATION
         missing = 40 + 1e-9 < at < 40 + gap - 1e-9

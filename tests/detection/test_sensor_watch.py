@@ -13,13 +13,14 @@ DURATION, DT = 1.0, 0.01
 RANGES = np.array([2.0, 0.5])
 
 
-def profile(noise=1e-3, longest_repeats=0.0, largest_jumps=0.002):
+def profile(noise=1e-3, longest_repeats=0.0, largest_jumps=0.002, usual_gaps=DT):
     ones = np.ones(2)
-    return ExecutionProfile(np.asarray(0.1), noise * ones, longest_repeats * ones, largest_jumps * RANGES)
+    return ExecutionProfile(np.asarray(0.1), noise * ones, longest_repeats * ones, largest_jumps * RANGES, usual_gaps * ones)
 
 
-def watch(**shown):
-    return SensorWatch(profile(**shown), RANGES, DURATION, DT)
+def watch(n_dof=2, **shown):
+    """Of two signals, both of them positions unless told otherwise."""
+    return SensorWatch(profile(**shown), RANGES, n_dof, DURATION, DT)
 
 
 def movement(rng, n=100):
@@ -142,8 +143,9 @@ def test_units_do_not_matter(seed, exponent):
     samples = movement(rng)
     samples[rng.integers(2, 99, 5)] += RANGES * rng.choice([-1, 1]) * 0.5
     scaled = SensorWatch(
-        ExecutionProfile(np.asarray(0.1), np.full(2, 1e-3) * unit, np.zeros(2), 0.002 * RANGES * unit),
+        ExecutionProfile(np.asarray(0.1), np.full(2, 1e-3) * unit, np.zeros(2), 0.002 * RANGES * unit, np.full(2, DT)),
         RANGES * unit,
+        2,
         DURATION,
         DT,
     )

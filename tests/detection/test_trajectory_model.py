@@ -10,11 +10,11 @@ from strategies import seeds
 from probdmp.detection.evidence import EVIDENCE
 from probdmp.detection.trajectory_family import values_of
 from probdmp.detection.trajectory_model import (
-    CHANNELS,
-    FLOORS,
-    HANDICAPS,
     LARGEST_LOG_RATIO,
     MEMORY,
+    MOVEMENT_CHANNELS,
+    MOVEMENT_FLOORS,
+    MOVEMENT_HANDICAPS,
     TrajectoryModel,
     as_suspicion,
 )
@@ -72,9 +72,9 @@ def test_each_channel_speaks_when_it_can(trajectories):
     spoken = ~np.isnan(values)
     assert spoken[:, :2].all()
     asked = [(kind, horizon) for kind in EVIDENCE for horizon in kind.horizons]
-    assert len(CHANNELS) == len(FLOORS) == len(HANDICAPS) == 2 + len(asked)
+    assert len(MOVEMENT_CHANNELS) == len(MOVEMENT_FLOORS) == len(MOVEMENT_HANDICAPS) == 2 + len(asked)
     for channel, (kind, horizon) in enumerate(asked, start=2):
-        assert CHANNELS[channel] == f"{kind.name}_{horizon}"
+        assert MOVEMENT_CHANNELS[channel] == f"{kind.name}_{horizon}"
         assert horizon in kind.ahead
         np.testing.assert_array_equal(np.flatnonzero(spoken[:, channel]), np.arange(horizon, kind.last + 1))
 

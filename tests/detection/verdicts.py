@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from probdmp.dmp import task_for
-from probdmp.execution import OnlineExecution
+from probdmp.execution import OnlineExecution, SensorArray, readings_of
 
 NUMBERS = ("time", "phase", "test_ratio")
 
@@ -35,9 +35,10 @@ def task_of(primitive, recording, told):
 
 
 def run_online(primitive, task, recording, detector):
-    """The execution after its last tick, and all its steps."""
-    execution = OnlineExecution(primitive, task, recording.dt, detector)
-    return execution, [execution.step(row) for row in recording.positions]
+    """The execution after its last tick, and all its steps; observed by what the detector was fitted with."""
+    array = SensorArray(primitive, detector.sensors_)
+    execution = OnlineExecution(primitive, task, recording.dt, detector, sensors=array)
+    return execution, [execution.step(row) for row in readings_of(array, recording)]
 
 
 def transformed(recordings, factors=1.0, offsets=0.0, slower=1.0, order=None):

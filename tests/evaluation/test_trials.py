@@ -143,13 +143,33 @@ def test_another_movement_must_be_recorded_alike(members, experiment, change):
         draw_trials([*members, *others], replace(experiment, faults=("wrong_class",)))
 
 
-def test_sensor_channels_of_a_faulty_execution_are_left_out(experiment):
-    """They were recorded with another movement, and may have another length."""
+def test_sensor_channels_go_along_with_a_fault(experiment):
+    """As long as the movement that was made of it; its positions are as those of executions without channels."""
     walks = np.random.default_rng(0).standard_normal((6, 30, 2)).cumsum(axis=1)
-    members = [Demonstration(walk, 0.01, "w", channels={"force": np.ones(30)}) for walk in walks]
-    (trial,) = draw_trials(members, replace(experiment, faults=("slow",)))
-    assert all("force" in d.channels for d in trial.tests)
-    assert not any(d.channels for d in trial.faulty["slow"])
+    bare = [Demonstration(walk, 0.01, "w") for walk in walks]
+    felt = [replace(d, channels={"force": d.positions[:, 0] + 2}) for d in bare]
+    names = tuple(name for name in ALL if name != "wrong_class")
+    (trial,), (without,) = (draw_trials(given, replace(experiment, faults=names)) for given in (felt, bare))
+    assert trial.onsets == without.onsets
+    for name in names:
+        assert same(trial.faulty[name], without.faulty[name])
+        for test, faulty, onset in zip(trial.tests, trial.faulty[name], trial.onsets[name], strict=True):
+            assert faulty.channels["force"].shape == (faulty.n_samples,)
+            np.testing.assert_array_equal(faulty.channels["force"][:onset], test.channels["force"][:onset])
+
+
+def test_faults_of_channels_leave_the_movement_as_it_is(experiment):
+    walks = np.random.default_rng(0).standard_normal((6, 30, 2)).cumsum(axis=1)
+    felt = [Demonstration(walk, 0.01, "w", channels={"force": walk[:, 0] + 2}) for walk in walks]
+    (trial,) = draw_trials(felt, replace(experiment, faults=("lift", "press", "press:0.8")))
+    assert trial.onsets["press"] == trial.onsets["press:0.8"] != trial.onsets["lift"]
+    for executions in trial.faulty.values():
+        assert same(executions, trial.tests)
+        for test, faulty in zip(trial.tests, executions, strict=True):
+            assert np.any(faulty.channels["force"] != test.channels["force"])
+    for test, once, twice in zip(trial.tests, trial.faulty["press"], trial.faulty["press:0.8"], strict=True):
+        added, doubled = (d.channels["force"] - test.channels["force"] for d in (once, twice))
+        np.testing.assert_allclose(doubled, 2 * added, atol=1e-9)
 
 
 # --- what is commanded ------------------------------------------------------------------------------------------------

@@ -136,11 +136,12 @@ def test_each_demonstration_has_its_own_start_goal_and_duration(scheme):
 def test_the_parameters_of_a_primitive():
     """theta_primitive = {mu_w, Sigma_w, alpha, beta, R} fully describes the representation: nothing else is learned from shape.
 
-    Any other array of a `Primitive` belongs to the task, to the units or to the start; `variation` is not the paper's.
+    Any other array of a `Primitive` belongs to the task, to the units or to the start; `variation` and `channels` are not the
+    paper's.
     """
     theta = {"weight_means", "weight_covariances", "weight_precisions", "forcing_precisions", "observation_variances"}
     task = {"start", "goal", "goal_displacements", "start_velocities", "start_covariances", "ranges"}
-    plain = {"configuration", "duration", "dt", "phase_step", "n_demonstrations", "names", "units", "variation"}
+    plain = {"configuration", "duration", "dt", "phase_step", "n_demonstrations", "names", "units", "variation", "channels"}
     assert {field.name for field in fields(Primitive)} == theta | task | plain
 
 

@@ -43,6 +43,8 @@ def test_as_published_has_the_papers_choices():
         "alpha_z": 25.0,
         "smoothing": 0.05,
         "goal_handling": "blend",  # of joint weights: without effect here
+        "coupling": "full",  # likewise of hierarchical ones
+        "channels": (),
     }
     assert ProbabilisticDMP.as_published(forcing_noise="posterior").forcing_noise == "posterior"
     assert replace(PUBLISHED, forcing_noise="predictive") == Experiment().configuration_for("paper")

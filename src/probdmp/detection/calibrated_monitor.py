@@ -24,6 +24,7 @@ class CalibratedMonitor:
     ----------
     label : of the primitive, which may have a threshold of its own.
     channels : (C) names of the channels.
+    names : (W) names of what is judged: positions, learned channels, outputs of other sensors.
     persistence : moments in a row with a test ratio above 1 that make an alarm.
     """
 
@@ -38,7 +39,7 @@ class CalibratedMonitor:
     ) -> None:
         self._source, self._calibration, self._channels = source, calibration, channels
         self._threshold, self._persistence = calibration.threshold_for(label), persistence
-        self._ratio, self._n_above, self._n_since, self._is_latched = 0.0, 0, 0, False
+        self._ratio, self._n_above, self._n_since, self._is_latched, self._channel = 0.0, 0, 0, False, 0
         self._verdict = Verdict(False, 0, 0.0, 1.0, 0.0, np.zeros(len(names)), names)
 
     @property
@@ -66,6 +67,7 @@ class CalibratedMonitor:
         if self._is_latched:
             self._look_closer()
         elif ratio > self._verdict.test_ratio or self._n_above >= self._persistence:
+            self._channel = channel
             self._latch(observed, ratio, self._source.contributions(channel), self._channels[channel])
             if self._n_above >= self._persistence:
                 self._is_latched = True
@@ -88,7 +90,7 @@ class CalibratedMonitor:
         """The reason as it looks now; that of a faulty sensor stands."""
         if self._verdict.kind not in ("sensor", "data missing"):
             if self._n_since in LOOKED_AT_AGAIN:
-                kind, cause = self._source.diagnose(self._n_since)
+                kind, cause = self._source.diagnose(self._channel, self._n_since)
                 better = self._source.better() if kind == "motion" else ""
                 self._verdict = replace(self._verdict, kind=kind, cause=cause, better=better)
             self._n_since += 1
@@ -96,7 +98,9 @@ class CalibratedMonitor:
     def _note_sensor(self, observed: Observed, sensors: SensorWatch) -> None:
         """A sensor fault explains what the movement seemed to do."""
         if not self._verdict.failed:
-            self._latch(observed, sensors.ratio, sensors.shares, "sensor")
+            shares = np.zeros(len(self._verdict.names))
+            shares[: len(sensors.shares)] = sensors.shares
+            self._latch(observed, sensors.ratio, shares, "sensor")
         self._is_latched = True
         verdict = replace(self._verdict, kind="sensor", cause=sensors.cause, better="")
         self._verdict = replace(verdict, failed=True, has_sensor_fault=True)

@@ -23,7 +23,7 @@ from probdmp.detection.sources import Source
 from probdmp.detection.trajectory_family import TrajectoryFamily, tells_goal
 from probdmp.dmp import Primitive, Task
 from probdmp.errors import InputError, TooFewDemonstrationsError
-from probdmp.execution import Observed, task_of_recording
+from probdmp.execution import Observed, SensorArray, task_of_recording
 
 __all__ = ["CalibratedRule"]
 
@@ -48,6 +48,7 @@ class Family(Protocol):
     ) -> Iterator[tuple[Source, Iterator[Observed]]]: ...
     def left_out_maxima(self, member: Member, tasks: Sequence[Task]) -> FloatArray: ...
     def maxima(self, member: Member, tasks: Sequence[Task]) -> FloatArray: ...
+    def watched(self, primitive: Primitive) -> tuple[str, ...]: ...
     def state(self) -> dict[str, Any]: ...
 
 
@@ -76,7 +77,10 @@ class CalibratedRule:
     def fit(cls, options: DetectorOptions, library: Library, on_part: Callable[[str, int], None]) -> Self:
         """Calibrate on the recordings of the library; `on_part` is told after each part, with the number of all."""
         family: Family
-        family = TrajectoryFamily.fit(library) if options.statistic == "trajectory" else InnovationFamily(options.statistic)
+        if options.statistic == "trajectory":
+            family = TrajectoryFamily.fit(library)
+        else:
+            family = InnovationFamily(options.statistic, library.arrays)
         primitives = {label: member.primitive for label, member in library.members.items()}
         told = {
             knows_goal: {label: _tasks(member, knows_goal) for label, member in library.members.items()}
@@ -133,7 +137,9 @@ class CalibratedRule:
         return {"options": asdict(self.options), "family": self.family.state(), "calibrations": calibrations}
 
     @classmethod
-    def from_state(cls, state: Mapping[str, Any], primitives: Mapping[str, Primitive]) -> Self:
+    def from_state(
+        cls, state: Mapping[str, Any], primitives: Mapping[str, Primitive], arrays: Mapping[str, SensorArray]
+    ) -> Self:
         """The rule again.
 
         Raises
@@ -149,9 +155,9 @@ class CalibratedRule:
             identities = [primitive.identity for primitive in primitives.values()]
             _check_keys(state["family"], identities if options.statistic == "trajectory" else ())
             if options.statistic == "trajectory":
-                family = TrajectoryFamily.from_state(state["family"], primitives)
+                family = TrajectoryFamily.from_state(state["family"], primitives, arrays)
             else:
-                family = InnovationFamily(options.statistic)
+                family = InnovationFamily(options.statistic, arrays)
             modes = {knows_goal: mode for knows_goal, mode in MODES.items() if mode in state["calibrations"]}
             _check_keys(state["calibrations"], modes.values() or MODES.values())
             calibrations = {}
@@ -169,7 +175,8 @@ class CalibratedRule:
     def _monitor(self, primitive: Primitive, task: Task, source: Source) -> CalibratedMonitor:
         calibration = self.calibration(primitive, task)
         label, channels = self._labels[primitive.identity], self.family.channels
-        return CalibratedMonitor(source, calibration, label, channels, primitive.names, self.options.persistence)
+        watched = self.family.watched(primitive)
+        return CalibratedMonitor(source, calibration, label, channels, watched, self.options.persistence)
 
 
 def _tasks(member: Member, knows_goal: bool) -> list[Task]:
@@ -177,10 +184,14 @@ def _tasks(member: Member, knows_goal: bool) -> list[Task]:
     if member.tasks is not None:
         agree = all(tells_goal(task) == knows_goal for task in member.tasks)
         return list(member.tasks) if agree else []
+    untold = own_tasks(member.primitive, member.recordings)  # which refuses recordings of another kind
     if not knows_goal:
-        return own_tasks(member.primitive, member.recordings)
-    if any(np.isnan(recording.positions).all(axis=0).any() for recording in member.recordings):
+        return untold
+    unseen = np.any([np.isnan(recording.positions).all(axis=0) for recording in member.recordings], axis=0)
+    if np.any(unseen & member.array.measured[: len(unseen)]):
         raise InputError("recordings of which every degree of freedom was measured", "one of which one was not")
+    if unseen.any():  # where they end is not measured by any sensor, so nothing is known of executions that are told
+        return []
     return [task_of_recording(member.primitive, r, goal=_last_seen(r)) for r in member.recordings]
 
 

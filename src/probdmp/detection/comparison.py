@@ -83,6 +83,6 @@ class Comparison:
     def _candidate(self, label: str) -> Candidate:
         if label not in self._candidates:
             primitive = self._primitives[label]
-            model = path_model(primitive, self._profiles[primitive.identity], knows_goal=False)
+            model = path_model(primitive, self._profiles[primitive.identity], knows_goal=False).of_movement()
             self._candidates[label] = Candidate(model, primitive.ranges, primitive.duration)
         return self._candidates[label]

@@ -20,7 +20,8 @@ from probdmp.detection.trajectory_family import tells_goal
 from probdmp.detection.verdict import Verdict
 from probdmp.dmp import Primitive, Task
 from probdmp.errors import InputError, InputTypeError, NotFittedError
-from probdmp.execution import Observed, check_tasks
+from probdmp.execution import Observed, Sensor, SensorArray, check_tasks
+from probdmp.execution.plain_sensors import sensors_as_plain, sensors_from_plain
 
 __all__ = ["FailureDetector"]
 
@@ -48,6 +49,7 @@ class FailureDetector:
     Attributes
     ----------
     primitives_ : the primitives by label.
+    sensors_ : what observes executions; None: positions and learned channels.
     """
 
     def __init__(
@@ -71,6 +73,7 @@ class FailureDetector:
         dt: float | None = None,
         tasks: Sequence[Task] | Mapping[str, Sequence[Task]] | None = None,
         on_part: Callable[[str, int], None] = lambda label, n_parts: None,
+        sensors: Sequence[Sensor] | None = None,
     ) -> Self:
         """Learn what is normal.
 
@@ -83,9 +86,11 @@ class FailureDetector:
             nothing but their start, and, where it is calibrated, for those that are told their goal and duration as well.
         on_part : of the calibrated rule, for a progress bar: called after each part of the calibration with the label it was
             about and the number of all parts.
+        sensors : what observes executions, and has observed the demonstrations; positions and learned channels unless given.
+            Positions and channels are judged as a trajectory, other sensors by the innovations of the filter.
         """
         check_choice(self.rule, "rule", RULES)
-        library = Library.of(learned, demonstrations, dt, tasks)
+        library = Library.of(learned, demonstrations, dt, tasks, sensors)
         rule: CalibratedRule | PaperRule
         if self.rule == "paper":
             rule = PaperRule.fit(self.likelihood, library)
@@ -95,6 +100,8 @@ class FailureDetector:
             rule = CalibratedRule.fit(options, library, on_part)
         # Together, and only now: a fit that fails leaves the detector as it was.
         self.rule_, self.primitives_ = rule, {label: member.primitive for label, member in library.members.items()}
+        self.sensors_ = None if sensors is None else tuple(sensors)
+        self._outputs = {identity: array.outputs for identity, array in library.arrays.items()}
         return self
 
     @property
@@ -115,12 +122,23 @@ class FailureDetector:
         known = "known" if tells_goal(task) else "nominal"
         return next((facts for facts in self.calibrations_ if (facts.task, facts.label) == (known, label)), None)
 
-    def monitor(self, primitive: Primitive, task: Task, dt: float) -> CalibratedMonitor | LikelihoodMonitor:
-        """A fresh judge for one execution of a primitive, which the detector must have been fitted to."""
+    def monitor(
+        self, primitive: Primitive, task: Task, dt: float, outputs: tuple[str, ...] | None = None
+    ) -> CalibratedMonitor | LikelihoodMonitor:
+        """A fresh judge for one execution of a primitive, which the detector must have been fitted to.
+
+        Parameters
+        ----------
+        outputs : names of what the sensors of the execution measure; those that the detector was fitted with, unless given.
+        """
         rule = self._fitted()
         if primitive.identity not in {own.identity for own in self.primitives_.values()}:
             hint = "Learned anew? Fit the detector again too."
             raise InputError("a primitive that this detector was fitted to", "another one", hint)
+        fitted = self._outputs[primitive.identity]
+        if outputs is not None and outputs != fitted:
+            hint = "Give fit(…, sensors=…) those that observe executions; what is normal depends on them."
+            raise InputError(f"an execution observed by {', '.join(fitted)}, as in calibration", ", ".join(outputs), hint)
         return rule.monitor(primitive, task, dt)
 
     def replay(
@@ -159,7 +177,8 @@ class FailureDetector:
 
     def state(self) -> dict[str, Any]:
         """What a model file keeps, as plain values."""
-        return {"rule": self.rule, **self._fitted().state()}
+        learned = self._fitted().state()
+        return {"rule": self.rule, "sensors": None if self.sensors_ is None else sensors_as_plain(self.sensors_), **learned}
 
     @classmethod
     def from_state(cls, state: object, primitives: Mapping[str, Primitive]) -> Self:
@@ -172,15 +191,20 @@ class FailureDetector:
         """
         if not isinstance(state, Mapping):
             raise InputTypeError("the state of a detector as a mapping", f"{state!r:.100}")
+        if "sensors" not in state:
+            raise InputError("the state of a detector with the sensors it was fitted with", f"{state!r:.200}")
         parts = dict(state)
-        rule = check_choice(parts.pop("rule", None), "rule", RULES)
+        rule, plain = check_choice(parts.pop("rule", None), "rule", RULES), parts.pop("sensors", None)
         detector = cls(rule=rule)
         detector.primitives_ = dict(primitives)
+        sensors = None if plain is None else sensors_from_plain(plain, next(iter(primitives.values())))
+        arrays = {primitive.identity: SensorArray(primitive, sensors) for primitive in primitives.values()}
+        detector.sensors_, detector._outputs = sensors, {identity: array.outputs for identity, array in arrays.items()}
         if rule == "paper":
-            detector.rule_ = PaperRule.from_state(parts, primitives)
+            detector.rule_ = PaperRule.from_state(parts, primitives, arrays)
             detector.likelihood = detector.rule_.likelihood
         else:
-            detector.rule_ = CalibratedRule.from_state(parts, primitives)
+            detector.rule_ = CalibratedRule.from_state(parts, primitives, arrays)
             for name, value in parts["options"].items():
                 setattr(detector, name, value)
         return detector

@@ -3,7 +3,6 @@
 import numpy as np
 
 from probdmp.checks import FloatArray
-from probdmp.demonstrations import Demonstration
 from probdmp.detection.phase_clock import PhaseClock, Tick
 from probdmp.detection.profile import ExecutionProfile
 from probdmp.detection.sensor_watch import SensorWatch
@@ -17,29 +16,36 @@ class ExecutionTicks:
 
     def __init__(self, primitive: Primitive, profile: ExecutionProfile, task: Task, dt: float) -> None:
         duration = float(task.duration)
-        self.sensors = SensorWatch(profile, primitive.ranges, duration, dt)
-        self._clock = PhaseClock(primitive.n_dof, duration, dt)
-        self._ranges, self._start = primitive.ranges, np.full(primitive.n_dof, np.nan)
+        ranges, self._n_dof = primitive.signals.ranges, primitive.n_dof
+        self.sensors = SensorWatch(profile, ranges, self._n_dof, duration, dt)
+        self._clock = PhaseClock(profile.usual_gaps, duration, dt)
+        self._ranges, self._start = ranges, np.where(np.arange(len(ranges)) < self._n_dof, np.nan, 0.0)
         self._task, self._has_begun = task, False
-        self.goal = np.full(primitive.n_dof, np.nan)
+        self.goal = np.full(self._n_dof, np.nan)
         """(D,) array: displacement of the goal as a fraction of the range; NaN where it is not told, or the start was not seen
         by the first tick."""
 
     def advance(self, time: float, measured: FloatArray) -> list[Tick]:
-        """Take in a sample (D,), data units; returns the ticks that are complete."""
+        """Take in a sample (S,), units of each signal; returns the ticks that are complete."""
         believed = self.sensors.believe(measured)
-        # Displacements count from where the execution was first seen, not from where it was told to be.
+        # Displacements count from where the execution was first seen, not from where it was told to be; channels from zero.
         self._start = np.where(np.isnan(self._start), believed, self._start)
         ticks = self._clock.advance(time, (believed - self._start) / self._ranges)
         if ticks and not self._has_begun:
-            self._has_begun, self.goal = True, (self._task.goal - self._start) / self._ranges
+            d = self._n_dof
+            self._has_begun, self.goal = True, (self._task.goal - self._start[:d]) / self._ranges[:d]
         return ticks
 
 
 def ticks_of_recording(
-    primitive: Primitive, profile: ExecutionProfile, task: Task, recording: Demonstration
+    primitive: Primitive, profile: ExecutionProfile, task: Task, dt: float, measured: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Displacements of a whole recording at its ticks, (T, D), and its goal, (D,)."""
-    ticks = ExecutionTicks(primitive, profile, task, recording.dt)
-    path = [tick.values for t, row in enumerate(recording.positions) for tick in ticks.advance(t * recording.dt, row)]
-    return np.stack(path) if path else np.zeros((0, recording.n_dof)), ticks.goal
+    """Displacements and channels of a whole recording at its ticks, (T, S), and its goal, (D,).
+
+    Parameters
+    ----------
+    measured : its signals, (T, S) array.
+    """
+    ticks = ExecutionTicks(primitive, profile, task, dt)
+    path = [tick.values for t, row in enumerate(measured) for tick in ticks.advance(t * dt, row)]
+    return np.stack(path) if path else np.zeros((0, measured.shape[1])), ticks.goal

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 from probdmp.demonstrations import Demonstration, Recordings, as_demonstrations
 from probdmp.dmp import Primitive, Task
 from probdmp.errors import InputError, NotFittedError
-from probdmp.execution import check_tasks, task_of_recording
+from probdmp.execution import Sensor, SensorArray, check_tasks, task_of_recording
 
 __all__ = ["Learned", "Library", "Member", "own_tasks"]
 
@@ -27,6 +27,10 @@ class Member:
     recordings: Sequence[Demonstration]
     tasks: Sequence[Task] | None
     """What each recording was asked to do, if that was said."""
+    given_sensors: Sequence[Sensor] | None
+    """What was said to observe executions, if anything was."""
+    array: SensorArray
+    """What has observed the recordings, and will observe executions."""
     taught_by: frozenset[str] | None = None
     """Fingerprints of the demonstrations that taught the primitive, as long as that is known."""
 
@@ -48,6 +52,7 @@ class Library:
         demonstrations: Recordings | Mapping[str, Recordings],
         dt: float | None,
         tasks: Sequence[Task] | Mapping[str, Sequence[Task]] | None,
+        sensors: Sequence[Sensor] | None,
     ) -> "Library":
         """From what `FailureDetector.fit` is given."""
         primitives = learned if isinstance(learned, Mapping) else {"": learned}
@@ -59,8 +64,14 @@ class Library:
             chosen = as_demonstrations(recordings[label], primitive.dt if dt is None else dt)
             given = asked[label]
             taught_by = getattr(item, "taught_by_", None)
-            members[label] = Member(primitive, chosen, None if given is None else check_tasks(given, chosen), taught_by)
+            checked = None if given is None else check_tasks(given, chosen)
+            members[label] = Member(primitive, chosen, checked, sensors, SensorArray(primitive, sensors), taught_by)
         return cls(members)
+
+    @property
+    def arrays(self) -> dict[str, SensorArray]:
+        """What observes each primitive, by its identity."""
+        return {member.primitive.identity: member.array for member in self.members.values()}
 
     def check_taught(self, taught: bool) -> None:
         """Refuse recordings that should have taught the primitive and did not, or the other way round, as far as is known."""

@@ -2,10 +2,12 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from probdmp.checks import check_choice, check_count, check_fraction
 from probdmp.detection.calibration import CALIBRATIONS
 from probdmp.detection.sources import INNOVATION_STATISTICS
-from probdmp.errors import InputError
+from probdmp.errors import InputError, InputTypeError
 
 __all__ = ["STATISTICS", "DetectorOptions"]
 
@@ -35,5 +37,7 @@ class DetectorOptions:
         object.__setattr__(self, "false_alarm_rate", rate)
         check_choice(self.statistic, "statistic", STATISTICS)
         check_choice(self.calibration, "calibration", CALIBRATIONS)
+        if not isinstance(self.pooled, bool | np.bool_):
+            raise InputTypeError("pooled as True or False", f"{self.pooled!r:.100}")
         object.__setattr__(self, "pooled", bool(self.pooled))
         object.__setattr__(self, "persistence", check_count(self.persistence, "persistence", most=MOST_PERSISTENT))

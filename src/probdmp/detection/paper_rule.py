@@ -16,6 +16,7 @@ from probdmp.detection.statistics import LIKELIHOODS
 from probdmp.detection.thresholds import PaperThreshold
 from probdmp.dmp import Primitive, Task
 from probdmp.errors import InputError
+from probdmp.execution import SensorArray
 
 __all__ = ["PaperRule"]
 
@@ -26,10 +27,11 @@ class PaperRule:
     Parameters
     ----------
     likelihood : a name from `LIKELIHOODS`.
+    thresholds, arrays : the threshold and the sensors of each primitive, by its identity.
     """
 
-    def __init__(self, likelihood: str, thresholds: Mapping[str, PaperThreshold]) -> None:
-        self.likelihood, self.thresholds = likelihood, thresholds
+    def __init__(self, likelihood: str, thresholds: Mapping[str, PaperThreshold], arrays: Mapping[str, SensorArray]) -> None:
+        self.likelihood, self.thresholds, self.arrays = likelihood, thresholds, arrays
 
     @classmethod
     def fit(cls, likelihood: str, library: Library) -> "PaperRule":
@@ -38,23 +40,25 @@ class PaperRule:
         thresholds = {}
         for member in library.members.values():
             minimum = np.inf
-            for ticks in replay(member.primitive, member.tasks_or_own(), member.recordings):
-                statistic = LikelihoodStatistic(likelihood, member.primitive.ranges)
+            for ticks in replay(member.primitive, member.tasks_or_own(), member.recordings, member.array):
+                statistic = LikelihoodStatistic(likelihood, member.array.scales)
                 minimum = min(minimum, *(statistic.update(observed)[0] for observed in ticks))
             if not np.isfinite(minimum):
                 raise InputError("demonstrations of which something was measured", "only missing samples")
             thresholds[member.primitive.identity] = PaperThreshold(minimum)
-        return cls(likelihood, thresholds)
+        return cls(likelihood, thresholds, library.arrays)
 
     def monitor(self, primitive: Primitive, task: Task, dt: float) -> LikelihoodMonitor:
         """A fresh judge for one execution."""
-        return LikelihoodMonitor(primitive, self.likelihood, self.thresholds[primitive.identity])
+        identity = primitive.identity
+        return LikelihoodMonitor(self.arrays[identity], self.likelihood, self.thresholds[identity])
 
     def replay(
         self, primitive: Primitive, tasks: Sequence[Task], recordings: Sequence[Demonstration]
     ) -> Iterator[tuple[LikelihoodMonitor, Iterator[Any]]]:
         """For each recording, a judge and what an execution would have shown it."""
-        for task, recording, ticks in zip(tasks, recordings, replay(primitive, tasks, recordings), strict=True):
+        replayed = replay(primitive, tasks, recordings, self.arrays[primitive.identity])
+        for task, recording, ticks in zip(tasks, recordings, replayed, strict=True):
             yield self.monitor(primitive, task, recording.dt), ticks
 
     def state(self) -> dict[str, Any]:
@@ -62,7 +66,9 @@ class PaperRule:
         return {"likelihood": self.likelihood, "minima": {i: t.minimum for i, t in self.thresholds.items()}}
 
     @classmethod
-    def from_state(cls, state: Mapping[str, Any], primitives: Mapping[str, Primitive]) -> "PaperRule":
+    def from_state(
+        cls, state: Mapping[str, Any], primitives: Mapping[str, Primitive], arrays: Mapping[str, SensorArray]
+    ) -> "PaperRule":
         """The rule again."""
         minima = state.get("minima")
         if set(state) != {"likelihood", "minima"} or not isinstance(minima, Mapping):
@@ -72,4 +78,5 @@ class PaperRule:
         return cls(
             check_choice(state["likelihood"], "likelihood", LIKELIHOODS),
             {identity: PaperThreshold(float(check_array(m, "minimum", ()))) for identity, m in minima.items()},
+            arrays,
         )

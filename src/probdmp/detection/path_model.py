@@ -5,7 +5,8 @@
 Where the goal is told, the Gaussian is conditioned on ending there: the shape changes as the demonstrations say it does.
 Where it is not, neither is the duration: that executions are slower or faster adds d^2 (s m'(s)) (s m'(s))^T, d the standard
 deviation of log durations. Each sample, the first one included, may be off its time by c ticks, which moves it by c m'.
-Positions are in units of each degree of freedom's range, so nothing here has a unit.
+Channels that were learned with the movement stand beside the displacements as they are. All are in units of their range, so
+nothing here has a unit.
 """
 
 from dataclasses import dataclass
@@ -29,21 +30,26 @@ CLOCK_SHARE = 12**-0.5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PathModel:
-    """Displacements from the start on M = TICKS + 1 phases, as fractions of the range."""
+    """Displacements from the start, and channels, on M = TICKS + 1 phases, as fractions of their range: S signals."""
 
     means: FloatArray
-    """m, (M, D) array, before a goal is told."""
+    """m, (M, S) array, before a goal is told."""
     covariance: FloatArray
-    """Sigma, (M, D, M, D) array; with a known goal, given that goal."""
+    """Sigma, (M, S, M, S) array; with a known goal, given that goal."""
     goal_gains: FloatArray
-    """(M, D, D) array: how a goal moves the mean; zero where the goal is not told."""
+    """(M, S, D) array: how a goal moves the mean; zero where the goal is not told."""
     noise_variances: FloatArray
-    """R, (D,) array."""
+    """R, (S,) array."""
 
     def means_for(self, goals: FloatArray) -> FloatArray:
-        """Mean paths of executions with goals (n, D), as displacements; NaN where not told. (n, M, D) array."""
-        ahead = np.nan_to_num(goals - self.means[-1])
+        """Mean paths of executions with goals (n, D), as displacements; NaN where not told. (n, M, S) array."""
+        ahead = np.nan_to_num(goals - self.means[-1, : goals.shape[-1]])
         return np.asarray(self.means + np.einsum("mde,ne->nmd", self.goal_gains, ahead))
+
+    def of_movement(self) -> "PathModel":
+        """Without the channels."""
+        d = self.goal_gains.shape[-1]
+        return PathModel(self.means[:, :d], self.covariance[:, :d, :, :d], self.goal_gains[:, :d], self.noise_variances[:d])
 
 
 def path_model(primitive: Primitive, profile: ExecutionProfile, knows_goal: bool) -> PathModel:
@@ -55,28 +61,29 @@ def path_model(primitive: Primitive, profile: ExecutionProfile, knows_goal: bool
     knows_goal : whether executions are told their goal and duration.
     """
     path = path_distribution(primitive, TICKS + 1)
-    ranges = primitive.ranges
+    ranges, d = primitive.signals.ranges, primitive.n_dof
     means = path.means / ranges
     covariance = path.covariance / np.multiply.outer(ranges, ranges)[:, None, :]
     noise = (profile.noise_stds / ranges) ** 2 + NOISE_FLOOR**2
-    gains = np.zeros((*means.shape, len(ranges)))
+    gains = np.zeros((*means.shape, d))
     if knows_goal:
-        ending = covariance[:, :, -1]  # (M, D, D): with the end
-        gains = ending @ np.linalg.inv(ending[-1] + np.diag(noise))
+        ending = covariance[:, :, -1, :d]  # (M, S, D): with the end
+        gains = ending @ np.linalg.inv(ending[-1, :d] + np.diag(noise[:d]))
         covariance = covariance - np.einsum("mde,nfe->mdnf", gains, ending)
     else:
         phases = np.linspace(0.0, 1.0, TICKS + 1)
         stretch = profile.tempo_std * phases[:, None] * np.gradient(means, phases, axis=0)
         covariance = covariance + np.multiply.outer(stretch, stretch)
     clock = max(CLOCK_STD, CLOCK_SHARE * TICKS * primitive.phase_step)
-    return PathModel(means, covariance + _clock_covariance(means, clock), gains, noise)
+    return PathModel(means, covariance + _clock_covariance(means, clock, d), gains, noise)
 
 
-def _clock_covariance(means: FloatArray, clock: float) -> FloatArray:
-    """What uncertain times of samples add, (M, D, M, D); displacements count from the first, so its error is in all others."""
+def _clock_covariance(means: FloatArray, clock: float, n_dof: int) -> FloatArray:
+    """What uncertain times of samples add, (M, S, M, S); displacements count from the first, so its error is in all others."""
     moved = clock * np.gradient(means, axis=0)
     covariance = np.zeros((*means.shape, *means.shape))
-    covariance[1:, :, 1:, :] = np.multiply.outer(moved[0], moved[0])[None, :, None, :]
+    first = np.where(np.arange(means.shape[1]) < n_dof, moved[0], 0.0)
+    covariance[1:, :, 1:, :] = np.multiply.outer(first, first)[None, :, None, :]
     ticks = np.arange(1, len(means))
     covariance[ticks, :, ticks, :] += moved[1:, :, None] * moved[1:, None, :]
     return covariance

@@ -27,7 +27,7 @@ class Tick(NamedTuple):
     number: int
     """Ticks since the start; beyond `TICKS` once the movement should be over."""
     values: FloatArray
-    """(D,) array, as given to the clock; NaN where nothing was seen around the tick."""
+    """(S,) array, as given to the clock; NaN where nothing was seen around the tick."""
 
 
 class PhaseClock:
@@ -35,15 +35,17 @@ class PhaseClock:
 
     Parameters
     ----------
-    n_dof : D.
+    usual_gaps : (S,) array, seconds: how far apart the samples of each signal are.
     duration, dt : seconds, of the movement and between samples.
     """
 
-    def __init__(self, n_dof: int, duration: float, dt: float) -> None:
+    def __init__(self, usual_gaps: FloatArray, duration: float, dt: float) -> None:
         self._rate = TICKS / duration
-        self._longest_gap = max(LONGEST_GAP, 2.5 * dt * self._rate)
-        self._last_times = np.full(n_dof, -np.inf)
-        self._last_values = np.full(n_dof, np.nan)
+        # What is never measured is not waited for.
+        gaps = 1.5 * np.where(np.isfinite(usual_gaps), usual_gaps, 0.0) * self._rate
+        self._longest_gaps = np.maximum(max(LONGEST_GAP, 2.5 * dt * self._rate), gaps)
+        self._last_times = np.full(len(usual_gaps), -np.inf)
+        self._last_values = np.full(len(usual_gaps), np.nan)
         self._pending: list[Tick] = []
         self._next = 0
 
@@ -53,7 +55,7 @@ class PhaseClock:
         Parameters
         ----------
         time : seconds since the start, not before the last one.
-        values : (D,) array, any unit; NaN where nothing was measured.
+        values : (S,) array, any unit; NaN where nothing was measured.
         """
         now = time * self._rate
         while self._next <= now + ROUNDING:
@@ -69,7 +71,7 @@ class PhaseClock:
         self._last_values = np.where(seen, values, self._last_values)
         ready = 0
         for tick in self._pending:
-            if np.isnan(tick.values).any() and now - tick.number < self._longest_gap:
+            if np.any(np.isnan(tick.values) & (now - tick.number < self._longest_gaps)):
                 break
             ready += 1
         done, self._pending = self._pending[:ready], self._pending[ready:]
@@ -78,7 +80,7 @@ class PhaseClock:
     def _fill(self, now: float, values: FloatArray, seen: NDArray[np.bool_]) -> None:
         """Straight lines from the last sample to this one, over the ticks between them."""
         gaps = now - self._last_times
-        near = seen & (gaps <= self._longest_gap)
+        near = seen & (gaps <= self._longest_gaps)
         slopes = np.where(near, (values - self._last_values) / np.maximum(gaps, ROUNDING), 0.0)
         for tick in self._pending:
             here = seen & (np.abs(now - tick.number) <= ROUNDING)

@@ -1,7 +1,7 @@
 """What the demonstrations of a primitive show about executions beside their path: tempo, noise, oddities of the sensor."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import Any, Self
 
 import numpy as np
@@ -12,6 +12,8 @@ from probdmp.errors import InputError
 
 __all__ = ["ExecutionProfile", "repeats"]
 
+NEVER = 1e9
+"""Seconds; longer than any movement."""
 LEAST_TEMPO_STD = 0.01
 """Least standard deviation of log durations; executions that all last equally long do not vouch for the next."""
 
@@ -23,47 +25,66 @@ class ExecutionProfile:
     tempo_std: FloatArray
     """() array: standard deviation of the logarithm of the duration."""
     noise_stds: FloatArray
-    """(D,) array, data units: noise of the sensor."""
+    """(S,) array, units of each signal: noise of the sensor."""
     longest_repeats: FloatArray
-    """(D,) array, seconds: longest time for which the same number was measured again and again."""
+    """(S,) array, seconds: longest time for which the same number was measured again and again."""
     largest_jumps: FloatArray
-    """(D,) array, data units: largest distance of a sample from the straight line through the two before it."""
+    """(S,) array, units of each signal: largest distance of a sample from the straight line through the two before it."""
+    usual_gaps: FloatArray
+    """(S,) array, seconds: median time from one sample to the next; infinite for what was never measured."""
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
 
     @classmethod
-    def of(cls, demonstrations: Sequence[Demonstration]) -> Self:
-        """What K demonstrations show."""
+    def of(cls, demonstrations: Sequence[Demonstration], measured: Sequence[FloatArray] | None = None) -> Self:
+        """What K demonstrations show.
+
+        Parameters
+        ----------
+        measured : all signals of each, (T, S) arrays; its positions unless given.
+        """
+        signals = [d.positions for d in demonstrations] if measured is None else measured
         durations = np.log([d.duration for d in demonstrations])
         tempo = max(float(np.std(durations, ddof=1)) if len(durations) > 1 else 0.1, LEAST_TEMPO_STD)
-        jumps = [_largest_jumps(d.positions) for d in demonstrations]
+        pairs = list(zip(demonstrations, signals, strict=True))
         return cls(
             np.asarray(tempo),
-            np.median([noise_stds(d.positions) for d in demonstrations], axis=0),
-            np.max([repeats(d.positions).max(axis=0) * d.dt for d in demonstrations], axis=0),
-            np.max(jumps, axis=0),
+            np.nan_to_num(np.median([noise_stds(values) for values in signals], axis=0)),
+            np.max([repeats(values).max(axis=0) * d.dt for d, values in pairs], axis=0),
+            np.max([_largest_jumps(values) for values in signals], axis=0),
+            np.max([_usual_gaps(values) * d.dt for d, values in pairs], axis=0),
         )
 
     def state(self) -> dict[str, Any]:
         """Plain values, for a model file."""
-        return {name: np.asarray(value).tolist() for name, value in asdict(self).items()}
+        plain = {name: np.asarray(value).tolist() for name, value in asdict(self).items()}
+        return plain | {"usual_gaps": [gap if np.isfinite(gap) else None for gap in plain["usual_gaps"]]}
 
     @classmethod
-    def from_state(cls, state: Mapping[str, Any], n_dof: int) -> Self:
+    def from_state(cls, state: Mapping[str, Any], n_signals: int) -> Self:
         """The profile again."""
-        shapes = {"tempo_std": (), "noise_stds": (n_dof,), "longest_repeats": (n_dof,), "largest_jumps": (n_dof,)}
-        if set(state) != set(shapes):
-            raise InputError(f"a profile with {', '.join(shapes)}", f"{state!r:.200}")
-        return cls(**{name: check_array(state[name], name, shape) for name, shape in shapes.items()})
+        names = [field.name for field in fields(cls)]
+        if set(state) != set(names) or not isinstance(state["usual_gaps"], list):
+            raise InputError(f"a profile with {', '.join(names)}", f"{state!r:.200}")
+        finite = {**state, "usual_gaps": [NEVER if gap is None else gap for gap in state["usual_gaps"]]}
+        checked = {name: check_array(finite[name], name, () if name == "tempo_std" else (n_signals,)) for name in names}
+        gaps = checked["usual_gaps"]
+        return cls(**{**checked, "usual_gaps": np.where(gaps >= NEVER, np.inf, gaps)})
 
 
 def repeats(positions: FloatArray) -> FloatArray:
-    """How often in a row each sample repeats the one before it exactly, (T, D) array of counts."""
+    """How often in a row each sample repeats the one before it exactly, (T, S) array of counts."""
     counts = np.zeros(positions.shape)
     for t in range(1, len(positions)):
         counts[t] = np.where(positions[t] == positions[t - 1], counts[t - 1] + 1, 0)
     return counts
+
+
+def _usual_gaps(values: FloatArray) -> FloatArray:
+    """Samples from one that was measured to the next, (S,) array; infinite where hardly any was."""
+    places = [np.flatnonzero(~np.isnan(column)) for column in values.T]
+    return np.array([float(np.median(np.diff(seen))) if len(seen) > 1 else np.inf for seen in places])
 
 
 def _largest_jumps(positions: FloatArray) -> FloatArray:

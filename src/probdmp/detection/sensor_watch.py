@@ -30,6 +30,8 @@ LONGEST_SPIKE = 3
 """Samples; what is wild for longer is how the movement goes, whether or not they agree."""
 SILENCE_SHARE = 0.1
 """Nothing measured for this fraction of the duration: the execution can no longer be judged."""
+GAP_FACTOR = 2.0
+"""But for a sensor that measures less often than that: for so many times as long as is usual in the demonstrations."""
 
 
 class SensorWatch:
@@ -38,12 +40,14 @@ class SensorWatch:
     Parameters
     ----------
     profile : what the demonstrations showed.
-    ranges : (D,) array, data units.
+    ranges : (S,) array, units of each signal.
+    n_dof : how many of the signals are positions.
     duration, dt : seconds, of the movement and between samples.
     """
 
-    def __init__(self, profile: ExecutionProfile, ranges: FloatArray, duration: float, dt: float) -> None:
-        n_dof = len(ranges)
+    def __init__(self, profile: ExecutionProfile, ranges: FloatArray, n_dof: int, duration: float, dt: float) -> None:
+        n_signals = len(ranges)
+        self._n_dof = n_dof
         self._largest_jumps = np.maximum(JUMP_FACTOR * profile.largest_jumps, LEAST_JUMP * ranges)
         longest = profile.longest_repeats / dt
         self._most_repeats = np.where(
@@ -51,15 +55,17 @@ class SensorWatch:
             np.maximum(COARSE_FACTOR * longest, COARSE_SHARE * duration / dt),
             max(LEAST_REPEATS, LEAST_REPEAT_SHARE * duration / dt),
         )
-        self._most_silent = max(SILENCE_SHARE * duration / dt, 2.0)
-        unknown = np.full(n_dof, np.nan)
+        # A force may well be constant, at rest or at its limit; if it should not be, its own statistic says so.
+        self._most_repeats = np.where(np.arange(n_signals) < n_dof, self._most_repeats, np.inf)
+        self._most_silent = np.maximum(max(SILENCE_SHARE * duration / dt, 2.0), GAP_FACTOR * profile.usual_gaps / dt)
+        unknown = np.full(n_signals, np.nan)
         self._believed = (unknown, unknown)
         """The last sample but one, and the last."""
         self._is_calm = False
-        self._suspicious = np.full(n_dof, np.nan)
-        self._last = np.full(n_dof, np.nan)
-        self._silent, self._skipped = np.zeros(n_dof), np.zeros(n_dof)
-        self.repeats, self.spikes = np.zeros(n_dof), np.zeros(n_dof)
+        self._suspicious = np.full(n_signals, np.nan)
+        self._last = np.full(n_signals, np.nan)
+        self._silent, self._skipped = np.zeros(n_signals), np.zeros(n_signals)
+        self.repeats, self.spikes = np.zeros(n_signals), np.zeros(n_signals)
 
     @property
     def cause(self) -> str:
@@ -71,8 +77,8 @@ class SensorWatch:
 
     @property
     def _all_repeat(self) -> bool:
-        """Whether each of several sensors gives the same number again and again."""
-        return len(self.repeats) > 1 and bool(np.all(self.repeats > 0))
+        """Whether each of several positions is the same number again and again."""
+        return self._n_dof > 1 and bool(np.all(self.repeats[: self._n_dof] > 0))
 
     @property
     def is_stale(self) -> bool:
@@ -81,7 +87,7 @@ class SensorWatch:
 
     @property
     def shares(self) -> FloatArray:
-        """(D,) array: of what is wrong with each sensor to what may be."""
+        """(S,) array: of what is wrong with each sensor to what may be."""
         return np.maximum(self.repeats / self._most_repeats, self.spikes / MOST_SPIKES)
 
     @property
@@ -92,10 +98,10 @@ class SensorWatch:
     @property
     def staleness(self) -> float:
         """How long a sensor has been silent relative to how long it may be; above 1 when it is stale."""
-        return float(self._silent.max() / self._most_silent)
+        return float(np.max(self._silent / self._most_silent))
 
     def believe(self, measured: FloatArray) -> FloatArray:
-        """The sample (D,) without what is suspicious of it, which is NaN instead; data units."""
+        """The sample (S,) without what is suspicious of it, which is NaN instead; units of each signal."""
         older, old = self._believed
         jumps = np.abs(measured - old - (self._skipped + 1) * (old - older))
         if self._is_calm and np.all(jumps <= self._largest_jumps) and not np.any(measured == self._last):

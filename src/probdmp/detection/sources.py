@@ -33,11 +33,11 @@ class Source(Protocol):
         ...
 
     def contributions(self, channel: int) -> FloatArray:
-        """(D,) array: signed squared deviation of each degree of freedom in a channel at the last moment."""
+        """(W,) array: signed squared deviation of each signal or output that is watched in a channel at the last moment."""
         ...
 
-    def diagnose(self, seen_since: int) -> Diagnosis:
-        """What seems to have happened, as seen so many moments after the alarm."""
+    def diagnose(self, channel: int, seen_since: int) -> Diagnosis:
+        """What seems to have happened, as seen so many moments after a channel has raised the alarm."""
         ...
 
     def better(self) -> str:
@@ -57,10 +57,11 @@ class InnovationSource:
     ----------
     statistic : `"log_likelihood"`: of a sample, as in the paper; `"nis"`: squared innovations in standard deviations, averaged
         over a short time; `"cusum"`: their cumulative sum above what is normal (Page 1954).
+    scales : (O,) array, units of the outputs of the sensors.
     """
 
-    def __init__(self, statistic: str, ranges: FloatArray, task: Task, dt: float) -> None:
-        self._judge, self._ranges = INNOVATION_STATISTICS[statistic], ranges
+    def __init__(self, statistic: str, scales: FloatArray, task: Task, dt: float) -> None:
+        self._judge, self._scales = INNOVATION_STATISTICS[statistic], scales
         self.recent: deque[float] = deque(maxlen=max(1, round(NIS_WINDOW * float(task.duration) / dt)))
         self.sum = 0.0
         self._last: Observed | None = None
@@ -75,10 +76,10 @@ class InnovationSource:
     def contributions(self, channel: int) -> FloatArray:
         """Squared innovations in standard deviations."""
         if self._last is None:
-            return np.zeros(len(self._ranges))
+            return np.zeros(len(self._scales))
         return signed_squares(self._last)
 
-    def diagnose(self, seen_since: int) -> Diagnosis:
+    def diagnose(self, channel: int, seen_since: int) -> Diagnosis:
         """Innovations do not tell why."""
         return Diagnosis("motion", "unexpected innovations")
 
@@ -91,7 +92,7 @@ class InnovationSource:
     def log_likelihood(self, observed: Observed) -> float:
         """How unlikely this sample is."""
         nats = standardized_contributions(
-            observed.contributions, observed.innovations, observed.innovation_variances, self._ranges
+            observed.contributions, observed.innovations, observed.innovation_variances, self._scales
         )
         return float(as_suspicion(-nats.sum()))
 
@@ -115,7 +116,7 @@ INNOVATION_STATISTICS = {
 
 
 def signed_squares(observed: Observed) -> FloatArray:
-    """(D,) array: squared innovations in standard deviations, with their sign; 0 where not seen."""
+    """(O,) array: squared innovations in standard deviations, with their sign; 0 where not seen."""
     innovations = np.nan_to_num(observed.innovations)
     return np.sign(innovations) * innovations**2 / observed.innovation_variances
 

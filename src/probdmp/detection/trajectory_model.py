@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from probdmp.checks import FloatArray, IntArray
+from probdmp.detection.channel_statistics import ChannelStatistic
 from probdmp.detection.evidence import EVIDENCE, Evidence
 from probdmp.detection.path_model import PathModel
 from probdmp.detection.trajectory_statistics import (
@@ -19,20 +20,35 @@ from probdmp.detection.trajectory_statistics import (
 )
 from probdmp.detection.windows import gather
 
-__all__ = ["CHANNELS", "FLOORS", "HANDICAPS", "MEMORY", "TrajectoryFollower", "TrajectoryModel", "as_suspicion"]
+__all__ = [
+    "MEMORY",
+    "MOVEMENT_CHANNELS",
+    "TrajectoryFollower",
+    "TrajectoryModel",
+    "as_suspicion",
+    "channels_for",
+]
 
-CHANNELS = ("position", "displacement", *(f"{kind.name}_{horizon}" for kind in EVIDENCE for horizon in kind.horizons))
-FLOORS = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0])
+MOVEMENT_CHANNELS = ("position", "displacement", *(f"{kind.name}_{horizon}" for kind in EVIDENCE for horizon in kind.horizons))
+MOVEMENT_FLOORS = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0])
 """Values up to which a channel is not suspicious: a standstill has to be likelier than its contrary."""
-HANDICAPS = np.array([2.0, 0.0, 1.0, 1.0, 1.0, 1.0, 2.0])
+MOVEMENT_HANDICAPS = np.array([2.0, 0.0, 1.0, 1.0, 1.0, 1.0, 2.0])
 """Nats of surprise by which a channel stands back behind displacement. What the others are for, a movement that ends elsewhere
 or stands still, becomes plain sooner or later; a push passes, and the false alarms that may be had are better spent on it."""
+FEEL_HANDICAP = 1.0
+"""The same of what learned channels, or sensors of other kinds, say."""
 MEMORY = max(int(kind.before.max()) + max(kind.horizons) for kind in EVIDENCE) + 1
 """Ticks that have to be remembered while executing."""
 
 LARGEST_LOG_RATIO = 500.0
 EVIDENCE_SCALE = 10.0
 """Nats of evidence that multiply the value of a channel by e."""
+
+
+def channels_for(names: tuple[str, ...]) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
+    """Names, floors and handicaps of the channels of a movement with these further ones."""
+    floors = np.concatenate([MOVEMENT_FLOORS, np.zeros(len(names))])
+    return (*MOVEMENT_CHANNELS, *names), floors, np.concatenate([MOVEMENT_HANDICAPS, np.full(len(names), FEEL_HANDICAP)])
 
 
 class Horizon(NamedTuple):
@@ -51,11 +67,14 @@ class TrajectoryModel:
 
     Parameters
     ----------
-    model : the Gaussian over paths.
+    whole : the Gaussian over paths and learned channels.
     """
 
-    def __init__(self, model: PathModel) -> None:
-        self.model = model
+    def __init__(self, whole: PathModel) -> None:
+        self._whole, self.model = whole, whole.of_movement()
+        model, self._n_dof = self.model, self.model.means.shape[1]
+        self.feel = tuple(ChannelStatistic(whole, signal) for signal in range(self._n_dof, whole.means.shape[1]))
+        """One statistic for each learned channel."""
         self.position, self.displacement = Position(model), Displacement(model)
         questions = [(evidence, ticks) for evidence in [kind(model) for kind in EVIDENCE] for ticks in evidence.horizons]
         self.horizons = tuple(
@@ -69,16 +88,19 @@ class TrajectoryModel:
 
         Parameters
         ----------
-        paths : (n, T, D) array, displacements from the start as fractions of the range; NaN where not seen.
+        paths : (n, T, S) array, displacements from the start and channels as fractions of the range; NaN where not seen.
         goals : (n, D) array, likewise; NaN where not told.
 
         Returns
         -------
-        (n, T, C) array in the order of `CHANNELS`; the larger, the more suspicious.
+        (n, T, C) array in the order of `channels_for`; the larger, the more suspicious.
         """
-        means, (n, length, _) = self.model.means_for(goals), paths.shape
-        ticks = np.arange(length)
-        values = np.full((n, length, len(CHANNELS)), np.nan)
+        whole, (n, length, _) = self._whole.means_for(goals), paths.shape
+        ticks, n_movement = np.arange(length), len(MOVEMENT_CHANNELS)
+        values = np.full((n, length, n_movement + len(self.feel)), np.nan)
+        for channel, statistic in enumerate(self.feel, start=n_movement):
+            values[..., channel] = statistic.judge(ticks, gather(paths, ticks, statistic.offsets), whole)
+        means, paths = whole[..., : self._n_dof], paths[..., : self._n_dof]
         values[..., 0] = self.position.judge(ticks, gather(paths, ticks, Position.offsets), means)
         squares = self.displacement.judge(ticks, gather(paths, ticks, Displacement.offsets), means)
         values[..., 1] = relative_to_sloppiness(squares)
@@ -93,26 +115,29 @@ class TrajectoryModel:
 
     def follow(self, goal: FloatArray) -> "TrajectoryFollower":
         """The same for one execution as it happens."""
-        return TrajectoryFollower(self, self.model.means_for(goal[None]))
+        return TrajectoryFollower(self, self._whole.means_for(goal[None]))
 
 
 class TrajectoryFollower:
     """The channels of one execution, tick by tick; remembers `MEMORY` ticks."""
 
     def __init__(self, trajectory: TrajectoryModel, means: FloatArray) -> None:
-        self._trajectory, self._means = trajectory, means
+        d = trajectory.model.means.shape[1]
+        self._trajectory, self._means, self._n_dof = trajectory, means[..., :d], d
         self.means = means[0]
-        """(M, D) array, the mean path."""
+        """(M, S) array, the mean path and what channels should read."""
         self.recent: deque[FloatArray] = deque(maxlen=MEMORY)
         self._tick = -1
         self._squares: deque[float] = deque(maxlen=SLOPPINESS_DELAY)
         self._before = np.zeros(2)
 
-    def update(self, displacement: FloatArray) -> FloatArray:
+    def update(self, signals: FloatArray) -> FloatArray:
         """Values of all channels at the next tick, (C,) array."""
-        self.remember(displacement)
-        trajectory, here = self._trajectory, np.array([self._tick])
-        values = np.full(len(CHANNELS), np.nan)
+        self.remember(signals)
+        trajectory, here, n_movement = self._trajectory, np.array([self._tick]), len(MOVEMENT_CHANNELS)
+        values = np.full(n_movement + len(trajectory.feel), np.nan)
+        for channel, statistic in enumerate(trajectory.feel, start=n_movement):
+            values[channel] = statistic.judge(here, self.signals(self._tick, statistic.offsets), self.means[None])[0, 0]
         values[0] = trajectory.position.judge(here, self.window(self._tick, Position.offsets), self._means)[0, 0]
         window = self.window(self._tick, Displacement.offsets)
         values[1] = self._relative(float(trajectory.displacement.judge(here, window, self._means)[0, 0]))
@@ -123,13 +148,17 @@ class TrajectoryFollower:
                 values[channel] = as_suspicion(found[0, 0, -1])
         return values
 
-    def remember(self, displacement: FloatArray) -> None:
-        """Take in a tick (D,) without judging it."""
+    def remember(self, signals: FloatArray) -> None:
+        """Take in a tick (S,) without judging it."""
         self._tick += 1
-        self.recent.append(displacement)
+        self.recent.append(signals)
 
     def window(self, place: int, offsets: IntArray) -> FloatArray:
         """(1, 1, P, D) array: displacements at ticks place + offsets."""
+        return self.signals(place, offsets)[..., : self._n_dof]
+
+    def signals(self, place: int, offsets: IntArray) -> FloatArray:
+        """(1, 1, P, S) array: displacements and channels at ticks place + offsets."""
         oldest = self._tick - len(self.recent) + 1
         ticks = np.maximum(place + offsets, 0) - oldest
         return np.stack([self.recent[int(i)] for i in ticks])[None, None]

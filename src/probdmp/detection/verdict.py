@@ -8,8 +8,9 @@ from probdmp.checks import FloatArray, freeze_arrays
 
 __all__ = ["KINDS", "Verdict"]
 
-KINDS = ("motion", "timing", "sensor", "data missing")
-"""What a failure is about: where the movement goes; when it gets there; what measures it; that nothing does."""
+KINDS = ("motion", "timing", "channel", "sensor", "data missing")
+"""What a failure is about: where the movement goes; when it gets there; how it feels, by a learned channel; what measures it;
+that nothing does."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,10 +31,10 @@ class Verdict:
     test_ratio: float
     """Statistic over threshold at `step`: above 1 for an alarm."""
     contributions: FloatArray
-    """(D,) array: squared deviation of each degree of freedom at `step`, in standard deviations of what was expected, with the
-    sign of the deviation (measured minus expected); of a sensor fault, how far each sensor is to blame. The largest is."""
+    """(W,) array: squared deviation of each degree of freedom and channel at `step`, in standard deviations of what was
+    expected, with its sign (measured minus expected); of a sensor fault, how far each sensor is to blame. The largest is."""
     names: tuple[str, ...]
-    """(D) names of the degrees of freedom."""
+    """(W) names of the degrees of freedom, and of the channels or sensors that are watched with them."""
     kind: str = ""
     """One of `KINDS`; nothing without an alarm, or where the rule does not tell."""
     cause: str = ""
@@ -52,7 +53,7 @@ class Verdict:
 
     @property
     def blamed(self) -> str:
-        """The degree of freedom that contributes most, with the sign of its deviation; nothing if none does."""
+        """The degree of freedom or channel that contributes most, with the sign of its deviation; nothing if none does."""
         if not np.any(self.contributions):
             return ""
         largest = int(np.argmax(np.abs(self.contributions)))

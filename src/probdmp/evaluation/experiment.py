@@ -7,11 +7,11 @@ Source: Meier & Schaal 2016, "Failure Detection with Probabilistic DMPs".
 
 from dataclasses import dataclass
 
-from probdmp.checks import check_choice, check_count
+from probdmp.checks import check_choice, check_count, check_names
 from probdmp.demonstrations import fault_named
 from probdmp.detection.options import DetectorOptions
 from probdmp.dmp import PUBLISHED, Configuration
-from probdmp.errors import InputTypeError
+from probdmp.errors import InputError, InputTypeError
 
 __all__ = ["TASKS", "Experiment"]
 
@@ -42,6 +42,8 @@ class Experiment:
     """What a calibrated detector is asked for, as a share of normal executions."""
     seeds: int = 1
     """Number of splits: with the seeds `seed`, `seed` + 1, …, figures pooled."""
+    channels: tuple[str, ...] = ()
+    """Sensor channels that the calibrated detector learns and watches with the movement."""
     traces: bool = False
     """Whether judges are asked to keep their statistic over time, for operating curves."""
 
@@ -57,6 +59,9 @@ class Experiment:
         check_count(self.seed, "seed", least=0)
         DetectorOptions(self.false_alarm_rate)
         check_choice(self.task, "task", TASKS)
+        if check_names(self.channels, "channels") and self.detector == "paper":
+            raise InputError("channels with the calibrated detector only", "them with the paper's, which knows positions alone")
+        object.__setattr__(self, "channels", tuple(self.channels))
         if isinstance(self.faults, str):
             raise InputTypeError("faults as a tuple of names", repr(self.faults), f"A single one: ({self.faults!r},).")
         for fault in self.faults:

@@ -13,7 +13,7 @@ from probdmp.dmp import Primitive, Task
 from probdmp.evaluation.experiment import Experiment
 from probdmp.evaluation.judges import READINGS, fit_paper_detector
 from probdmp.evaluation.trials import commanded_tasks, draw_trials
-from probdmp.execution import GaussianTrajectory, roll_out
+from probdmp.execution import GaussianTrajectory, SensorArray, roll_out
 
 __all__ = ["Illustration", "JudgedExecution", "illustrate", "judge_execution"]
 
@@ -84,8 +84,9 @@ def illustrate(demonstrations: Sequence[Demonstration], experiment: Experiment, 
 def judge_execution(detector: FailureDetector, primitive: Primitive, task: Task, recording: Demonstration) -> JudgedExecution:
     """One execution under the eyes of a detector, tick by tick; of any rule, the log-likelihood goes along."""
     own_threshold = detector.thresholds_.get(primitive.identity)
-    statistic = LikelihoodStatistic(detector.likelihood if own_threshold else "per_step", primitive.ranges)
-    values = np.array([statistic.update(observed)[0] for observed in next(replay(primitive, [task], [recording]))])
+    array = SensorArray(primitive, detector.sensors_)
+    statistic = LikelihoodStatistic(detector.likelihood if own_threshold else "per_step", array.scales)
+    values = np.array([statistic.update(observed)[0] for observed in next(replay(primitive, [task], [recording], array))])
     ((monitor, ticks),) = detector.replay(primitive, [task], [recording])
     ratios = np.array([monitor.update(observed) for observed in ticks])
     return JudgedExecution(recording, values, ratios, monitor.verdict, own_threshold.level if own_threshold else None)

@@ -96,7 +96,7 @@ def shown_primitive(trial: Trial, experiment: Experiment) -> Primitive:
 
 def _varied_primitive(trial: Trial, experiment: Experiment) -> Primitive:
     configuration = experiment.configuration_for("calibrated")
-    return fit_primitive(trial.training, configuration, LearningOptions("hierarchical"))[0]
+    return fit_primitive(trial.training, configuration, LearningOptions("hierarchical", channels=experiment.channels))[0]
 
 
 def _judge_by_paper(reading: Reading, trials: Sequence[Trial], experiment: Experiment, on_class: Progress) -> Assessment:

@@ -57,6 +57,7 @@ class Evaluation:
             false_alarm_rate=experiment.false_alarm_rate if any(j.calibrations for j in judges) else None,
             interval=CLOPPER_PEARSON if len(self.by_seed) == 1 else BOOTSTRAP,
             judges=judges,
+            channels=experiment.channels,
             command=command,
         )
 

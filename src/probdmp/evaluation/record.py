@@ -54,6 +54,8 @@ class EvaluationRecord:
     """How intervals were made: a name from `probdmp.evaluation.metrics`."""
     judges: tuple[JudgeRecord, ...]
     """The first stands for the evaluation."""
+    channels: tuple[str, ...] = ()
+    """Sensor channels that were learned and watched with the movement."""
     command: str = ""
     """What to type to get the same figures, if it is known."""
 
@@ -77,12 +79,13 @@ def record_of(document: Any) -> EvaluationRecord:
         fields = {name: restored(kind, document[name]) for name, kind in FIELDS.items()}
         judges = tuple(_judge(entry) for entry in document["readings"])
         command = restored(str, document.get("command", ""))
+        channels = restored(tuple[str, ...], document.get("channels", []))
     except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
         reason = f"missing {error}" if isinstance(error, KeyError) else str(error)
         raise DataFileError("an evaluation as JSON", f"something else ({reason:.200})", HINT) from error
     if not judges or not all(judge.summary.faults for judge in judges):
         raise DataFileError("an evaluation with a judge and a fault", "one without", HINT)
-    return EvaluationRecord(**fields, judges=judges, command=command)
+    return EvaluationRecord(**fields, judges=judges, channels=channels, command=command)
 
 
 def _judge(entry: Mapping[str, Any]) -> JudgeRecord:
