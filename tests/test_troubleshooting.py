@@ -24,6 +24,7 @@ from probdmp import (
     write_demonstrations,
 )
 from probdmp.cli import app
+from probdmp.execution import ChannelSensor, LinearSensor, NonlinearSensor, state_sensor
 from probdmp.plotting.style import require_matplotlib
 
 PAGE = Path(__file__).parent.parent / "docs/troubleshooting.md"
@@ -38,6 +39,11 @@ OTHERS = synthetic_letters(4, letters="c", dt=0.02, seed=1)
 
 def dmp(**settings: Any) -> ProbabilisticDMP:
     return ProbabilisticDMP(8, **settings).fit(LETTERS)
+
+
+def watched_by_a_function(learned: ProbabilisticDMP) -> FailureDetector:
+    sensor = NonlinearSensor("squares", lambda q: q**2, [1.0, 1.0], outputs=("x", "y"))
+    return FailureDetector(rule="paper").fit(learned, LETTERS, sensors=[sensor])
 
 
 def detector(learned: ProbabilisticDMP) -> FailureDetector:
@@ -61,6 +67,8 @@ PROVOKED: list[Callable[[], Any]] = [
     lambda: ProbabilisticDMP(scaling="paper", weight_uncertainty="independent").fit([ONE]),
     lambda: ProbabilisticDMP(n_basis=0).fit([ONE]),
     lambda: ProbabilisticDMP(weight_model="bayes").fit([ONE]),
+    lambda: dmp(channels=["force"]),
+    lambda: dmp(channels=["force"], weight_uncertainty="independent"),
     lambda: ProbabilisticDMP().rollout(),
     lambda: dmp().rollout(goal=[1.0, 2.0, 3.0]),
     lambda: dmp().rollout(duration=1000, dt=0.001),
@@ -70,6 +78,14 @@ PROVOKED: list[Callable[[], Any]] = [
     lambda: dmp().track(Demonstration(PATH, 0.01, names=("x", "y"), units="m")),
     lambda: dmp(weight_uncertainty="independent").condition([(0.2, [0.0, 0.0], 0.1)]),
     lambda: dmp().condition([(20.0, [0.0, 0.0], 0.1)]),
+    lambda: (p := dmp()).track(LETTERS[0], sensors=[state_sensor(p.primitive_, "gyro", "velocity", 0.1)]),
+    lambda: dmp().execute().step({"x": 1.0}),
+    lambda: dmp().execute(sensors=[ChannelSensor("force", np.array([1.0]))]),
+    lambda: LinearSensor("mix", np.ones((2, 6)), np.array([[1.0, 2.0], [2.0, 1.0]])),
+    lambda: (p := dmp()).execute(
+        sensors=[state_sensor(p.primitive_, "gyro", "velocity", 0.1)], detector=FailureDetector(rule="paper").fit(p, LETTERS)
+    ),
+    lambda: (p := dmp()).save("squares.probdmp", watched_by_a_function(p)),
     lambda: FailureDetector(1.5).fit(dmp(), LETTERS),
     lambda: FailureDetector().predict(LETTERS),
     lambda: FailureDetector().fit(dmp(), OTHERS),
@@ -103,6 +119,10 @@ SAID: list[tuple[str, ...]] = [
     ("monitor", "two.probdmp", "letters.npz"),
     ("evaluate", "letters.npz"),
     ("monitor", "watched.probdmp", "-"),
+    ("monitor", "watched.probdmp", "-", "--feedback", "camera"),
+    ("monitor", "watched.probdmp", "letters.npz", "--sensors", "gyro.toml"),
+    ("track", "watched.probdmp", "letters.npz", "--sensors", "noiseless.toml"),
+    ("track", "watched.probdmp", "letters.npz", "--sensors", "single.toml"),
 ]
 """Commands that end in an error, after the files that they read were written."""
 
@@ -114,6 +134,9 @@ def messages(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
         patch.chdir(tmp_path_factory.mktemp("trouble"))
         found = [_message(provoke) for provoke in PROVOKED]
         write_demonstrations("single.npz", LETTERS[:1])
+        gyro = 'name = "gyro"\nmeasures = "velocity"\n'
+        for name, text in (("gyro", "[[sensor]]\nstds = 1\n"), ("noiseless", "[[sensor]]\n"), ("single", "[sensor]\n")):
+            Path(f"{name}.toml").write_text(text + gyro)
         learned = dmp()
         learned.save("watched.probdmp", detector(learned))
         ticks = json.dumps({"position": [1.0, 2.0]}) + "\n" + json.dumps({"positions": 3}) + "\n"

@@ -49,7 +49,8 @@ def test_track_is_that_of_the_library(folder, library, run_json, letters, tmp_pa
     assert document["log_likelihood"] == pytest.approx(tracked.log_likelihoods.sum())
     assert (document["label"], document["index"]) == ("l", 7)
     with np.load(tmp_path / "t.npz") as saved:
-        assert set(saved) == {"label", "index", "names", "units", *ARRAYS, *TRACKED}
+        kept = {f"sensors/position/{name}" for name in document["sensors"]["position"]}
+        assert set(saved) == {"label", "index", "names", "units", "outputs", *ARRAYS, *TRACKED, *kept}
 
 
 def test_the_index_counts_recordings_with_the_label(folder, run_json):

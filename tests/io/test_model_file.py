@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from safetensors.numpy import load, save
 
-from probdmp.dmp import Variation
+from probdmp.dmp import ChannelVariation, Variation
 from probdmp.errors import InputError, InputTypeError, ModelFileError
 from probdmp.io import ModelContents, decode_model, encode_model, read_model, write_model
 
@@ -49,17 +49,24 @@ def with_header(header, body=b""):
     return struct.pack("<Q", len(text)) + text + body
 
 
+def assert_same_values(one, other):
+    assert type(one) is type(other)
+    for field in dataclasses.fields(other):
+        wanted, got = getattr(other, field.name), getattr(one, field.name)
+        if isinstance(wanted, np.ndarray):
+            assert (got.dtype, got.shape, got.tobytes()) == (wanted.dtype, wanted.shape, wanted.tobytes())
+            assert not got.flags.writeable
+        elif isinstance(wanted, Variation | ChannelVariation):
+            assert_same_values(got, wanted)
+        else:
+            assert got == wanted
+            assert type(got) is type(wanted)
+
+
 def assert_same(one, other):
     assert list(one.primitives) == sorted(other.primitives)
     for label, primitive in other.primitives.items():
-        for field in dataclasses.fields(primitive):
-            wanted, got = getattr(primitive, field.name), getattr(one.primitives[label], field.name)
-            if isinstance(wanted, np.ndarray):
-                assert (got.dtype, got.shape, got.tobytes()) == (wanted.dtype, wanted.shape, wanted.tobytes())
-                assert not got.flags.writeable
-            else:
-                assert got == wanted
-                assert type(got) is type(wanted)
+        assert_same_values(one.primitives[label], primitive)
         assert one.primitives[label].identity == primitive.identity
     assert (one.settings, one.detector, one.provenance) == (other.settings, other.detector, other.provenance)
 
@@ -69,12 +76,13 @@ def assert_same(one, other):
     seed=st.integers(0, 2**32),
     n_dof=st.integers(1, 3),
     n_basis=st.integers(1, 4),
+    n_channels=st.integers(0, 2),
     plain=st.tuples(json_dicts, st.none() | json_dicts, st.dictionaries(st.text(), st.text(), max_size=3)),
 )
 @settings(max_examples=60, deadline=None)
-def test_round_trip_is_exact(make_primitive, labels, seed, n_dof, n_basis, plain):
+def test_round_trip_is_exact(make_primitive, labels, seed, n_dof, n_basis, n_channels, plain):
     rng = np.random.default_rng(seed)
-    contents = ModelContents({label: make_primitive(rng, n_dof, n_basis) for label in labels}, *plain)
+    contents = ModelContents({label: make_primitive(rng, n_dof, n_basis, n_channels) for label in labels}, *plain)
     payload = encode_model(contents)
     restored = decode_model(payload, "m.probdmp")
     assert_same(restored, contents)
@@ -90,6 +98,12 @@ def test_round_trip_through_a_file(small_model, tmp_path):
 def test_any_safetensors_reader_reads_the_arrays(small_model):
     tensors = load(encode_model(small_model))
     np.testing.assert_array_equal(tensors["1/weight_means"], small_model.primitives["β"].weight_means)
+    np.testing.assert_array_equal(tensors["2/channels/means"], small_model.primitives["γ"].channels.means)
+
+
+def test_channels_are_named_in_the_metadata(small_model):
+    primitives = metadata_of(encode_model(small_model))["primitives"]
+    assert {label: values["channels"] for label, values in primitives.items()} == {"a": [], "β": [], "γ": ['ünit/"[N]']}
 
 
 def test_format_is_the_one_described(small_model):
@@ -177,11 +191,11 @@ def test_arrays_cannot_change_places(small_model):
 # Hostile files with the right digest
 
 
-def tampered(name, value):
-    """Replace one array of the first primitive."""
+def tampered(name, value, place=0):
+    """Replace one array of the first primitive, or of another one."""
 
     def change(metadata, tensors):
-        tensors[f"0/{name}"] = np.array(value, dtype=np.float64)
+        tensors[f"{place}/{name}"] = np.array(value, dtype=np.float64)
 
     return change
 
@@ -208,6 +222,21 @@ def without(*path):
 
 def one_tensor_less(metadata, tensors):
     del tensors["0/goal"]
+
+
+def of_channels(name, value):
+    """Replace one array of the channel, which is that of the last primitive."""
+    return tampered(f"channels/{name}", value, place=2)
+
+
+def named_channels(value):
+    return rewritten("primitives", "γ", "channels", value=value)
+
+
+def without_variation(metadata, tensors):
+    metadata["primitives"]["γ"]["variation"] = False
+    for name in [name for name in tensors if name.startswith("2/variation/")]:
+        del tensors[name]
 
 
 @pytest.mark.parametrize(
@@ -253,6 +282,36 @@ def one_tensor_less(metadata, tensors):
         (rewritten("schema", value="probdmp.primitive/2"), r"primitive/2'.*newer probdmp.*pip install --upgrade probdmp"),
         (rewritten("schema", value="probdmp.primitive/" + "9" * 5000), "newer probdmp"),
         (rewritten("schema", value=["probdmp.primitive/1"]), "schema"),
+        (named_channels([]), "primitives with tensors"),
+        (named_channels(None), "primitives with tensors"),
+        (named_channels(True), "channels as a list of names"),
+        (named_channels("f"), "primitives with tensors"),
+        (named_channels({"f": 1}), "primitives with tensors"),
+        (named_channels([1]), "names of channels as text"),
+        (named_channels([{}]), "names of channels as text"),
+        (named_channels([["f"]]), "names of channels as text"),
+        (named_channels(["f", "f"]), r"at least one channel, all named differently in m\.probdmp"),
+        (named_channels(["f", "g"]), r"channel means of shape \(2, N \+ 3\) in m\.probdmp, got \(1, 4\)"),
+        (named_channels(["q0"]), "channels named otherwise than the degrees of freedom"),
+        (rewritten("primitives", "a", "channels", value=["f"]), "primitives with tensors"),
+        (without("primitives", "γ", "channels"), "primitives with tensors"),
+        (
+            rewritten("primitives", "γ", "configuration", "weight_uncertainty", value="independent"),
+            "hierarchical.*with channels",
+        ),
+        (without_variation, "hierarchical.*with channels"),
+        (of_channels("means", [[1, 2, np.nan, 4]]), r"channel means finite in m\.probdmp, got nan"),
+        (of_channels("means", [[1, 2, 3]]), r"channel covariance of shape \(3, 3\)"),
+        (of_channels("covariance", np.eye(3)), r"channel covariance of shape \(4, 4\) in m\.probdmp, got \(3, 3\)"),
+        (of_channels("covariance", -np.eye(4)), "channels symmetric and positive semi-definite"),
+        (of_channels("covariance", np.triu(np.ones((4, 4)))), "channels symmetric and positive semi-definite"),
+        (of_channels("cross_covariance", np.ones((4, 4))), r"a cross covariance of shape \(4, 3\) in m\.probdmp, got \(4, 4\)"),
+        (of_channels("cross_covariance", np.ones((3, 3))), r"channel cross_covariance of shape \(4, D \(N \+ 2\)\)"),
+        (of_channels("cross_covariance", np.full((4, 3), 1e95)), "channels symmetric and positive semi-definite"),
+        (of_channels("ranges", [0.0]), r"channel ranges > 0 in m\.probdmp, got 0"),
+        (of_channels("observation_variances", [-1.0]), "channel observation_variances > 0"),
+        (of_channels("forcing_precisions", [1.0, 2.0]), r"channel forcing_precisions of shape \(1,\)"),
+        (of_channels("more", [1.0]), "primitives with tensors"),
     ],
 )
 def test_hostile_content_is_refused_whatever_its_digest(small_model, change, match):

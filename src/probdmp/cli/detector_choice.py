@@ -10,6 +10,7 @@ from probdmp.cli.progress import progress
 from probdmp.errors import TooFewDemonstrationsError
 
 if TYPE_CHECKING:
+    from probdmp.cli.sensor_file import SensorFile
     from probdmp.demonstrations import Demonstration
     from probdmp.detection import FailureDetector
     from probdmp.estimator import PrimitiveLibrary
@@ -65,12 +66,22 @@ def chosen_detector(rule: str | None, false_alarm_rate: float | None, settings: 
 
 
 def calibrate(
-    detector: "FailureDetector", library: "PrimitiveLibrary", demonstrations: Mapping[str, Sequence["Demonstration"]]
+    detector: "FailureDetector",
+    library: "PrimitiveLibrary",
+    demonstrations: Mapping[str, Sequence["Demonstration"]],
+    sensors: "SensorFile | None" = None,
 ) -> None:
-    """Fit a detector; what to do about too few demonstrations is said in the words of the command line."""
+    """Fit a detector; what to do about too few demonstrations is said in the words of the command line.
+
+    Parameters
+    ----------
+    sensors : what has observed the demonstrations; positions and learned channels unless given.
+    """
     scarce = [repr(label) for label, members in demonstrations.items() if len(members) < 2]
     if detector.rule == "calibrated" and scarce:
         hint = "Record more, leave it out with --label, or use --rule paper, which says nothing of false alarms."
         raise TooFewDemonstrationsError("two or more demonstrations of everything", f"one of {', '.join(scarce)}", hint)
+    primitives = {label: learned.primitive_ for label, learned in library.items()}
+    chosen = None if sensors is None else sensors.sensors_for_all(primitives)
     with progress("Calibrating", None) as done:
-        detector.fit(library, demonstrations, on_part=done)
+        detector.fit(library, demonstrations, on_part=done, sensors=chosen)

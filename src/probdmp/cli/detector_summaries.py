@@ -40,18 +40,22 @@ def detector_summary(detector: "FailureDetector") -> dict[str, Any]:
     """The rule, and by which thresholds it goes.
 
     Those of the paper's rule come by label, in nats: the least log-likelihood in training and the level below which an
-    execution has failed.
+    execution has failed. Sensors are as in `probdmp.execution.plain_sensors`; None: positions and learned channels.
     """
+    from probdmp.execution import sensors_as_plain
+
+    sensors = None if detector.sensors_ is None else sensors_as_plain(detector.sensors_)
     if detector.rule == "paper":
         thresholds = {label: detector.thresholds_[primitive.identity] for label, primitive in detector.primitives_.items()}
         levels = {label: {**asdict(t), "level": t.level} for label, t in thresholds.items()}
-        return {"rule": detector.rule, "likelihood": detector.likelihood, "thresholds": levels}
+        return {"rule": detector.rule, "likelihood": detector.likelihood, "thresholds": levels, "sensors": sensors}
     return {
         "rule": detector.rule,
         "statistic": detector.statistic,
         "false_alarm_rate": detector.false_alarm_rate,
         "persistence": detector.persistence,
         "calibrations": [asdict(facts) for facts in detector.calibrations_],
+        "sensors": sensors,
     }
 
 
@@ -68,6 +72,13 @@ def calibration_text(facts: "CalibrationFacts") -> str:
 
 def print_detector(summary: Mapping[str, Any]) -> None:
     """A detector from its summary."""
+    _print_rule(summary)
+    if summary["sensors"] is not None:
+        names = (f"{s['name']} ({', '.join(s.get('outputs', [s['name']]))})" for s in summary["sensors"])
+        print_line(f"Sensors of executions: {', '.join(names)}.")
+
+
+def _print_rule(summary: Mapping[str, Any]) -> None:
     if summary["rule"] == "paper":
         print_line(f"Failure detector: rule “paper”, log-likelihood {summary['likelihood'].replace('_', ' ')}.")
         print_table(

@@ -24,12 +24,13 @@ __all__ = ["Faults", "Test", "Train", "evaluate", "evaluation_of", "faults_of", 
 Train = Annotated[int, typer.Option(metavar="N", help="Demonstrations per class that teach the primitive.")]
 FAULT_HELP = """What is injected, with commas between, or all. Failures: hold (blocked), hold_release (for a while), slow, push
 (aside and back), drift, wrong_goal, wrong_class. Benign: dropout, jitter. Sensor faults: stuck_sensor, spikes. push:0.4, and so
-drift and wrong_goal, go astray by 0.4 of the range."""
+drift and wrong_goal, go astray by 0.4 of the range. With --channels: lift, press (press:0.4), wrong_channel."""
 WHY = {
-    "calibrated": "The calibrated detector has one way to make primitives.",
-    "paper": "The paper's rule takes no rate of false alarms.",
+    "--configuration": "The calibrated detector has one way to make primitives.",
+    "--false-alarm-rate": "The paper's rule takes no rate of false alarms.",
+    "--coupling": "The weights of the paper's primitives are independent.",
 }
-"""By detector: why an option of the other is refused."""
+"""By option of one detector: why the other refuses it."""
 Test = Annotated[int, typer.Option(metavar="N", help="Other demonstrations per class that are judged.")]
 Faults = Annotated[str, typer.Option("--fault", metavar="NAMES", help=FAULT_HELP)]
 
@@ -54,6 +55,16 @@ def evaluate(
         str,
         typer.Option(metavar="NAME", help="known: start, goal and duration are commanded; nominal: only the start is."),
     ] = "known",
+    channels: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAMES", help="Of calibrated: sensor channels to learn and watch with the movement, as pen_force."
+        ),
+    ] = None,
+    coupling: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Of calibrated: whether signals vary together: full (the default), none or auto."),
+    ] = None,
     configuration: Annotated[
         str | None,
         typer.Option(
@@ -79,7 +90,16 @@ def evaluate(
             detector,
             false_alarm_rate,
             configuration,
-            {"train": train, "test": test, "seed": seed, "seeds": seeds, "task": task, "faults": faults_of(fault)},
+            coupling,
+            {
+                "train": train,
+                "test": test,
+                "seed": seed,
+                "seeds": seeds,
+                "task": task,
+                "faults": faults_of(fault, channels is not None),
+                "channels": tuple(names_of(channels) or ()),
+            },
         )
     if report is not None:
         from probdmp.plotting.style import require_matplotlib
@@ -87,8 +107,8 @@ def evaluate(
         require_matplotlib()
     demonstrations = read_files(files, names_of(columns), dt=dt)
     result = evaluation_of(demonstrations, experiment)
-    given = [*map(str, files), *_given("--columns", columns), *_given("--dt", dt)]
-    command = _command(given, experiment, configuration)
+    given = [*map(str, files), *_given("--columns", columns), *_given("--dt", dt), *_given("--channels", channels)]
+    command = _command([*given, *_given("--coupling", coupling)], experiment, configuration)
     if as_json:
         print_json(result.as_dict(command))
     else:
@@ -100,7 +120,11 @@ def evaluate(
 
 
 def _experiment(
-    detector: str, false_alarm_rate: float | None, configuration: str | None, given: Mapping[str, Any]
+    detector: str,
+    false_alarm_rate: float | None,
+    configuration: str | None,
+    coupling: str | None,
+    given: Mapping[str, Any],
 ) -> "Experiment":
     """What was asked for; options of the other detector are refused."""
     from probdmp.checks import check_choice
@@ -108,11 +132,14 @@ def _experiment(
     from probdmp.evaluation import DETECTORS, Experiment
 
     check_choice(detector, "detector", DETECTORS)
-    others = {"calibrated": ("--configuration", configuration), "paper": ("--false-alarm-rate", false_alarm_rate)}
-    option, value = others[detector]
-    if value is not None:
-        raise UsageError(f"{option} with the other detector only", f"it with --detector {detector}", WHY[detector])
-    chosen = None
+    others: dict[str, dict[str, object]] = {
+        "calibrated": {"--configuration": configuration},
+        "paper": {"--false-alarm-rate": false_alarm_rate, "--coupling": coupling},
+    }
+    for option, value in others[detector].items():
+        if value is not None:
+            raise UsageError(f"{option} with the other detector only", f"it with --detector {detector}", WHY[option])
+    chosen = None if coupling is None else Configuration(weight_uncertainty="joint", coupling=coupling)
     if configuration is not None:
         configurations = {"published": PUBLISHED, "default": Configuration()}
         chosen = configurations[check_choice(configuration, "configuration", configurations)]
@@ -163,9 +190,10 @@ def _command(given: Sequence[str], experiment: "Experiment", configuration: str 
     return join([*words, *_given("--configuration", configuration)])
 
 
-def faults_of(text: str) -> tuple[str, ...]:
+def faults_of(text: str, has_channels: bool = False) -> tuple[str, ...]:
     """What `--fault` names, each once."""
-    from probdmp.demonstrations import FAULTS
+    from probdmp.demonstrations import CHANNEL_FAULTS, FAULTS
 
-    named = [[*FAULTS] if name == "all" else [name] for name in names_of(text) or ()]
+    every = [*FAULTS, *(CHANNEL_FAULTS if has_channels else ())]
+    named = [every if name == "all" else [name] for name in names_of(text) or ()]
     return tuple(dict.fromkeys(name for names in named for name in names))

@@ -15,7 +15,8 @@ from probdmp.cli.options import Columns, Json, RecordingFiles, SampleStep, check
 from probdmp.cli.output import print_json, print_line, print_table
 from probdmp.cli.progress import progress
 from probdmp.cli.recordings import read_files
-from probdmp.cli.summaries import by_name, common_units, name_text, primitive_summary
+from probdmp.cli.sensor_file import read_sensor_file
+from probdmp.cli.summaries import by_name, channel_noise, common_units, name_text, primitive_summary
 from probdmp.cli.trajectories import with_unit
 from probdmp.errors import InputError
 
@@ -91,6 +92,30 @@ def fit(
             help="The paper's configuration: semi_implicit_euler, its scaling, pooled and independent weights.",
         ),
     ] = False,
+    channels: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAMES",
+            help="Sensor channels to learn with the movement, such as pen_force: what they should read, and how that varies "
+            "with it. Needs the default weights.",
+        ),
+    ] = None,
+    coupling: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME",
+            help="Whether degrees of freedom, and channels, vary together: full, none, or auto: what makes demonstrations "
+            "likelier given the others.",
+        ),
+    ] = "full",
+    sensors: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.toml",
+            help="What observes executions, and has observed the demonstrations: the detector is calibrated with these "
+            "sensors. Default: positions and --channels.",
+        ),
+    ] = None,
     rule: Rule = None,
     false_alarm_rate: FalseAlarmRate = None,
     as_json: Json = False,
@@ -105,16 +130,18 @@ def fit(
     monitor can judge executions.
     """
     check_output(output, ".probdmp")
-    given = {"forcing_noise": forcing_noise, "discretization": discretization, "scaling": scaling}
-    given |= {"weight_model": weight_model, "weight_uncertainty": weight_uncertainty}
+    given: dict[str, Any] = {"forcing_noise": forcing_noise, "discretization": discretization, "scaling": scaling}
+    given |= {"weight_model": weight_model, "weight_uncertainty": weight_uncertainty, "coupling": coupling}
+    given["channels"] = None if channels is None else tuple(names_of(channels) or ())
     settings = _settings({"n_basis": n_basis, "smoothing": smoothing, **given}, published)
     detector = chosen_detector(rule, false_alarm_rate, settings)
+    file = None if sensors is None else read_sensor_file(sensors)
     from probdmp.estimator import PrimitiveLibrary
     from probdmp.evaluation import group_by_label
 
     demonstrations = group_by_label(read_files(files, names_of(columns), label, dt))
     library = PrimitiveLibrary(_learn(demonstrations, settings))
-    calibrate(detector, library, demonstrations)
+    calibrate(detector, library, demonstrations, file)
     with usage():
         library.save(output, detector, command_line(context))
     summaries = [_summary(name, learned) for name, learned in library.items()]
@@ -141,7 +168,10 @@ def _settings(given: Mapping[str, Any], published: bool) -> dict[str, Any]:
     settings = base.get_params() | chosen
     with usage():
         Configuration(**{field.name: settings[field.name] for field in fields(Configuration)})
-        LearningOptions(settings["weight_model"], settings["smoothing"])
+        LearningOptions(settings["weight_model"], settings["smoothing"], settings["channels"])
+    if settings["channels"] and settings["weight_uncertainty"] != "joint":
+        hint = "A forcing term that is redrawn at every step says nothing about the channels."
+        raise UsageError("--weight-uncertainty joint with --channels", settings["weight_uncertainty"], hint)
     return settings
 
 
@@ -178,9 +208,10 @@ def _summary(label: str, learned: "ProbabilisticDMP") -> dict[str, Any]:
 def _print_summaries(summaries: Sequence[Mapping[str, Any]]) -> None:
     scaling = any(s["not_scaled"] for s in summaries)
     noise = with_unit("sensor noise\nstd", common_units(summaries))
+    channels = any(s["channels"] for s in summaries)
     columns = ["primitive", "demos", "duration\n[s]", "rms error\n[% of range]", noise, "EM\niterations"]
     print_table(
-        [*columns, *(["not\nscaled"] if scaling else [])],
+        [*columns, *(["channel noise\nstd"] if channels else []), *(["not\nscaled"] if scaling else [])],
         [
             [
                 name_text(s["label"]),
@@ -191,6 +222,7 @@ def _print_summaries(summaries: Sequence[Mapping[str, Any]]) -> None:
                 "–"
                 if s["em_iterations"] is None
                 else f"{s['em_iterations']}" + ("" if s["em_converged"] else ", not converged"),
+                *([channel_noise(s)] if channels else []),
                 *([", ".join(s["not_scaled"])] if scaling else []),
             ]
             for s in summaries

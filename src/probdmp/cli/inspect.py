@@ -9,7 +9,7 @@ from probdmp.cli.detector_summaries import detector_summary, print_detector
 from probdmp.cli.exit_codes import UsageError
 from probdmp.cli.options import Json
 from probdmp.cli.output import print_json, print_line, print_table
-from probdmp.cli.summaries import by_name, common_units, name_text, primitive_summary
+from probdmp.cli.summaries import by_name, channel_noise, common_units, name_text, primitive_summary
 from probdmp.cli.system import print_system, system_summary
 from probdmp.cli.trajectories import with_unit
 
@@ -74,7 +74,7 @@ def _print_document(document: dict[str, Any]) -> None:
     print_line(document["model"], style="bold")
     print_line(f"Schema {document['schema']}, digest {document['digest']}, {made}")
     primitives, detector = document["primitives"], document["detector"]
-    units = common_units(primitives)
+    units, channels = common_units(primitives), any(p["channels"] for p in primitives)
     print_table(
         [
             "primitive",
@@ -84,6 +84,7 @@ def _print_document(document: dict[str, Any]) -> None:
             with_unit("from\n", units),
             with_unit("to\n", units),
             with_unit("sensor noise\nstd", units),
+            *(["channel noise\nstd"] if channels else []),
         ],
         [
             [
@@ -92,6 +93,7 @@ def _print_document(document: dict[str, Any]) -> None:
                 f"{p['duration']:.3f}",
                 f"{p['dt']:.4g}",
                 *(by_name(p[key]) for key in ("start", "goal", "sensor_noise_stds")),
+                *([channel_noise(p)] if channels else []),
             ]
             for p in primitives
         ],
@@ -109,7 +111,7 @@ def _configuration_text(primitive: dict[str, Any]) -> str:
     left_out = f" (not {', '.join(primitive['not_scaled'])})" if primitive["not_scaled"] else ""
     return (
         f"{values['n_basis']} basis functions, {values['discretization']}, scaling {values['scaling']}{left_out}, "
-        f"forcing noise {values['forcing_noise']}, alpha_z {values['alpha_z']:g}"
+        f"forcing noise {values['forcing_noise']}, coupling {values['coupling']}, alpha_z {values['alpha_z']:g}"
     )
 
 

@@ -27,6 +27,7 @@ __all__ = [
     "RecordingFiles",
     "SampleStep",
     "Seed",
+    "Sensors",
     "Start",
     "StartVelocity",
     "TaskOptions",
@@ -55,6 +56,12 @@ SampleStep = Annotated[
     float | None,
     typer.Option(
         "--dt", metavar="S", help="Of .csv: seconds between samples, for files without times; others are resampled to it."
+    ),
+]
+Sensors = Annotated[
+    Path | None,
+    typer.Option(
+        "--sensors", metavar="FILE.toml", help="What observes executions. Default: positions and what channels were learned."
     ),
 ]
 Seed = Annotated[int, typer.Option("--seed", min=0, metavar="N", help="Decides all that is random.")]

@@ -27,7 +27,7 @@ __all__ = ["perturb"]
 
 FAULT_HELP = """Failures: hold (blocked), hold_release (for a while), slow, push (aside and back), drift, wrong_goal,
 wrong_class (another movement of the same files). Benign: dropout, jitter. Sensor faults: stuck_sensor, spikes. push:0.4, and so
-drift and wrong_goal, go astray by 0.4 of the range."""
+drift and wrong_goal, go astray by 0.4 of the range. Of sensor channels: lift, press (press:0.4), wrong_channel."""
 
 
 def perturb(
@@ -50,7 +50,7 @@ def perturb(
     """Put a fault into recorded executions, to see what is noticed.
 
     Writes what would have been recorded, in the order of the files, and tells when each fault begins. What is drawn depends on
-    the seed, the label and the fault alone. Sensor channels are left out: a fault says nothing of them.
+    the seed, the label and the fault alone. Sensor channels of what is held, slowed down, or another movement, are so too.
     """
     from probdmp.demonstrations import fault_named
     from probdmp.io import write_demonstrations

@@ -4,19 +4,29 @@ import re
 import sys
 import warnings
 from collections.abc import Sequence
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from probdmp.cli.exit_codes import UsageError, usage
-from probdmp.errors import DataFileError, RecordingWarning
+from probdmp.cli.sensor_file import read_sensor_file
+from probdmp.errors import DataFileError, InputError, RecordingWarning
 
 if TYPE_CHECKING:
     from probdmp.demonstrations import Demonstration
     from probdmp.estimator import PrimitiveLibrary, ProbabilisticDMP
+    from probdmp.execution import Sensor
 
-__all__ = ["choose_primitive", "label_of_file", "primitive_of", "read_executions", "read_files", "read_recording"]
+__all__ = [
+    "choose_primitive",
+    "label_of_file",
+    "primitive_of",
+    "read_executions",
+    "read_files",
+    "read_recording",
+    "read_sensed",
+]
 
 
 def read_files(
@@ -39,17 +49,25 @@ def read_files(
 
 
 def read_executions(
-    paths: Sequence[Path], library: "PrimitiveLibrary", label: str | None, dt: float | None = None
+    paths: Sequence[Path],
+    library: "PrimitiveLibrary",
+    label: str | None,
+    dt: float | None = None,
+    outputs: Sequence[str] = (),
 ) -> list[tuple[Path, "Demonstration"]]:
     """Recorded executions of the primitives of a library, with the files they are from: all, or those with a label.
 
     Recordings without a label are executions of whatever primitive is asked for, and get its label; unless one is, of the
     primitive that their file is named after, if there is one.
+
+    Parameters
+    ----------
+    outputs : names of what sensors measure; a file that has them need not have positions, which are then missing.
     """
     _, first = choose_primitive(library, label if label is not None else next(iter(library)))
     primitive = first.primitive_
     with nullcontext() if dt is None else usage():
-        found = _read(paths, primitive.names, dt)
+        found = _read(paths, primitive.names, dt, outputs)
     chosen = _labelled(found, label) if label is not None else [(path, _named_by(path, d, library)) for path, d in found]
     units = next((d.units for _, d in chosen if d.units != primitive.units), "")
     if units and primitive.units:
@@ -59,14 +77,36 @@ def read_executions(
 
 
 def read_recording(
-    path: Path, library: "PrimitiveLibrary", label: str | None, index: int, dt: float | None = None
+    path: Path,
+    library: "PrimitiveLibrary",
+    label: str | None,
+    index: int,
+    dt: float | None = None,
+    outputs: Sequence[str] = (),
 ) -> tuple[str, "ProbabilisticDMP", "Demonstration"]:
-    """One recorded execution, the primitive it is an execution of, and the label of that."""
-    chosen = read_executions([path], library, label, dt)
+    """One recorded execution, the primitive it is an execution of, and the label of that; arguments as above."""
+    chosen = read_executions([path], library, label, dt, outputs)
     if index >= len(chosen):
         raise UsageError(f"--index from 0 to {len(chosen) - 1}", str(index), f"There are {len(chosen)} such recordings.")
     recording = chosen[index][1]
     return *primitive_of(library, recording), recording
+
+
+def read_sensed(
+    path: Path, library: "PrimitiveLibrary", label: str | None, index: int, dt: float | None, sensors: Path | None
+) -> tuple[str, "ProbabilisticDMP", "Demonstration", "tuple[Sensor, ...] | None"]:
+    """The same with the sensors that have observed it.
+
+    Parameters
+    ----------
+    sensors : the file that says which; positions and learned channels unless given.
+    """
+    if sensors is None:
+        return *read_recording(path, library, label, index, dt), None
+    file, first = read_sensor_file(sensors), next(iter(library.values()))
+    outputs = file.outputs_for((first if label is None else choose_primitive(library, label)[1]).primitive_)
+    name, learned, recording = read_recording(path, library, label, index, dt, outputs)
+    return name, learned, recording, file.sensors_for(learned.primitive_)
 
 
 def primitive_of(library: "PrimitiveLibrary", recording: "Demonstration") -> tuple[str, "ProbabilisticDMP"]:
@@ -101,18 +141,46 @@ def _named_by(path: Path, recording: "Demonstration", library: "PrimitiveLibrary
     return replace(recording, label=name) if not recording.label and name in library else recording
 
 
-def _read(paths: Sequence[Path], columns: Sequence[str] | None, dt: float | None) -> list[tuple[Path, "Demonstration"]]:
+def _read(
+    paths: Sequence[Path], columns: Sequence[str] | None, dt: float | None, outputs: Sequence[str] = ()
+) -> list[tuple[Path, "Demonstration"]]:
     """Every recording with its file; what had to be done to its samples is said on standard error."""
-    from probdmp.io import read_demonstrations
-
     found: list[tuple[Path, Demonstration]] = []
     for path in paths:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", RecordingWarning)
-            found += [(path, d) for d in read_demonstrations(path, columns=columns, dt=dt)]
+            found += [(path, d) for d in _recordings(path, columns, dt, outputs)]
         for warning in caught:
             print(f"probdmp: {warning.message}", file=sys.stderr)
     return found
+
+
+def _recordings(path: Path, columns: Sequence[str] | None, dt: float | None, outputs: Sequence[str]) -> list["Demonstration"]:
+    """Those of a file; if it has outputs of sensors, but not all positions, these are missing, unless they are outputs too."""
+    from probdmp.io import read_demonstrations
+
+    try:
+        return read_demonstrations(path, columns=columns, dt=dt)
+    except InputError:
+        needed = {*outputs} & {*(columns or ())}
+        for output in outputs:
+            with suppress(InputError):
+                found = read_demonstrations(path, columns=[output], dt=dt)
+                if all(needed <= {*d.names, *d.channels} for d in found):
+                    return [_as_seen(d, columns or ()) for d in found]
+        raise
+
+
+def _as_seen(recording: "Demonstration", names: Sequence[str]) -> "Demonstration":
+    """A recording whose positions are those of its columns that have the names, and missing where it has none."""
+    import numpy as np
+
+    from probdmp.demonstrations import Demonstration
+
+    columns = dict(zip(recording.names, recording.positions.T, strict=True)) | dict(recording.channels)
+    unseen = np.full(recording.n_samples, np.nan)
+    positions = np.column_stack([columns.pop(name, unseen) for name in names])
+    return Demonstration(positions, recording.dt, recording.label, tuple(names), channels=columns)
 
 
 def _labelled(found: Sequence[tuple[Path, "Demonstration"]], label: str) -> list[tuple[Path, "Demonstration"]]:

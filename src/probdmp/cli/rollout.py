@@ -39,7 +39,7 @@ def rollout(
     """Plan a movement: its mean and its uncertainty.
 
     In JSON and in the file: times (T), positions, velocities and accelerations (T, D) and their standard deviations (T, D),
-    in data units and seconds.
+    in data units and seconds; means and stds (T) of learned channels.
     """
     check_output(output, ".npz")
     from probdmp.estimator import PrimitiveLibrary

@@ -10,13 +10,14 @@ from probdmp.cli.options import (
     ModelFile,
     OutputArrays,
     SampleStep,
+    Sensors,
     Start,
     StartVelocity,
     TaskOptions,
     check_output,
 )
 from probdmp.cli.output import print_json, print_line
-from probdmp.cli.recordings import read_recording
+from probdmp.cli.recordings import read_sensed
 from probdmp.cli.summaries import name_text
 from probdmp.cli.trajectories import save_arrays, trajectory_arrays, trajectory_table
 
@@ -33,6 +34,7 @@ def smooth(
     duration: Duration = None,
     start_velocity: StartVelocity = None,
     dt: SampleStep = None,
+    sensors: Sensors = None,
     output: OutputArrays = None,
     as_json: Json = False,
 ) -> None:
@@ -40,13 +42,15 @@ def smooth(
 
     The state at each time given the whole recording, before and after.
 
-    In JSON and in the file: times (T), means and stds (T, D), in data units and seconds. Missing samples are filled in.
+    In JSON and in the file: times (T), means and stds (T, D), in data units and seconds, and those of learned channels (T).
+    Missing samples are filled in.
     """
     check_output(output, ".npz")
     from probdmp.estimator import PrimitiveLibrary
 
-    name, primitive, recording = read_recording(execution, PrimitiveLibrary.load(model), label, index, dt)
-    smoothed = primitive.smooth(recording, **TaskOptions(start, goal, duration, start_velocity).arguments(primitive.primitive_))
+    name, primitive, recording, seen_by = read_sensed(execution, PrimitiveLibrary.load(model), label, index, dt, sensors)
+    task = TaskOptions(start, goal, duration, start_velocity).arguments(primitive.primitive_)
+    smoothed = primitive.smooth(recording, sensors=seen_by, **task)
     arrays = {"label": name, "index": index, **trajectory_arrays(smoothed)}
     if output is not None:
         save_arrays(output, arrays)

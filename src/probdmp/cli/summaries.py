@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from probdmp.dmp import Primitive
 
-__all__ = ["by_name", "common_units", "name_text", "not_scaled", "primitive_summary"]
+__all__ = ["by_name", "channel_noise", "common_units", "name_text", "not_scaled", "primitive_summary"]
 
 
 def primitive_summary(label: str, primitive: "Primitive") -> dict[str, Any]:
@@ -23,9 +23,25 @@ def primitive_summary(label: str, primitive: "Primitive") -> dict[str, Any]:
         "start": dict(zip(names, primitive.start, strict=True)),
         "goal": dict(zip(names, primitive.goal, strict=True)),
         "sensor_noise_stds": dict(zip(names, primitive.observation_variances**0.5, strict=True)),
+        "channels": _channels(primitive),
         "not_scaled": not_scaled(primitive),
         "configuration": asdict(primitive.configuration),
     }
+
+
+def _channels(primitive: "Primitive") -> dict[str, dict[str, float]]:
+    """By name, in the units of each: noise of its sensor, what the movement does not explain of it, mean extent."""
+    learned = primitive.channels
+    if learned is None:
+        return {}
+    stds = {"sensor_noise_std": learned.observation_variances**0.5, "residual_std": learned.residual_variances**0.5}
+    figures = stds | {"range": learned.ranges}
+    return {name: {key: values[i] for key, values in figures.items()} for i, name in enumerate(learned.names)}
+
+
+def channel_noise(summary: Mapping[str, Any]) -> str:
+    """Standard deviation of the sensor of each learned channel, for a column of a table."""
+    return by_name({name: figures["sensor_noise_std"] for name, figures in summary["channels"].items()}) or "–"
 
 
 def not_scaled(primitive: "Primitive") -> list[str]:

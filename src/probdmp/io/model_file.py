@@ -7,7 +7,8 @@
                   of their names: its [name, "F64", shape] as canonical JSON, then its bytes
 
 The arrays of a primitive are tensors named `<i>/<field>`, i the place of its label among the sorted labels; those of its
-variation, if `"variation"` is true, `<i>/variation/<field>`. Nothing is ever unpickled or imported by name.
+variation, if `"variation"` is true, `<i>/variation/<field>`; those of its channels, if `"channels"`, the list of their names,
+is not empty, `<i>/channels/<field>`. Nothing is ever unpickled or imported by name.
 """
 
 import hashlib
@@ -20,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from probdmp.checks import FloatArray
-from probdmp.dmp import Configuration, Primitive, Variation
+from probdmp.dmp import ChannelVariation, Configuration, Primitive, Variation
 from probdmp.errors import InputError, InputTypeError, ModelFileError
 from probdmp.io.atomic import write_atomically
 from probdmp.io.canonical_json import dump_json, parse_json
@@ -34,7 +35,11 @@ SCHEMA = "probdmp.primitive/1"
 KEYS = {"schema", "primitives", "settings", "detector", "provenance", "digest"}
 ARRAYS = [field.name for field in fields(Primitive) if field.type is FloatArray]
 VALUES = {field.name for field in fields(Primitive)} - set(ARRAYS)
-VARIATION = [field.name for field in fields(Variation)]
+PARTS = {
+    "variation": [field.name for field in fields(Variation)],
+    "channels": [field.name for field in fields(ChannelVariation) if field.type is FloatArray],
+}
+"""By field of a primitive that has arrays of its own: their names."""
 CONFIGURATION = {field.name for field in fields(Configuration)}
 
 
@@ -135,13 +140,20 @@ def _digest(metadata: Mapping[str, Any], tensors: Mapping[str, FloatArray]) -> s
 
 def _values(primitive: Primitive) -> dict[str, Any]:
     values = {name: getattr(primitive, name) for name in VALUES}
-    varies = primitive.variation is not None
-    return values | {"configuration": asdict(primitive.configuration), "names": list(primitive.names), "variation": varies}
+    return values | {
+        "configuration": asdict(primitive.configuration),
+        "names": list(primitive.names),
+        "variation": primitive.variation is not None,
+        "channels": list(primitive.channel_names),
+    }
 
 
 def _arrays(primitive: Primitive) -> dict[str, FloatArray]:
-    variation = {} if primitive.variation is None else primitive.variation.arrays()
-    return {name: getattr(primitive, name) for name in ARRAYS} | {f"variation/{name}": a for name, a in variation.items()}
+    arrays = {name: getattr(primitive, name) for name in ARRAYS}
+    for part in PARTS:
+        if (value := getattr(primitive, part)) is not None:
+            arrays |= {f"{part}/{name}": array for name, array in value.arrays().items()}
+    return arrays
 
 
 def _primitives(given: Any, tensors: Mapping[str, FloatArray]) -> dict[str, Primitive]:
@@ -151,21 +163,33 @@ def _primitives(given: Any, tensors: Mapping[str, FloatArray]) -> dict[str, Prim
     for i, (label, values) in enumerate(sorted(given.items())):
         if not isinstance(values, dict) or values.keys() != VALUES:
             raise InputError(f"primitive {label!r:.100} with {sorted(VALUES)}", repr(values))
-        configuration, names, varies = values["configuration"], values["names"], values["variation"]
-        if not isinstance(configuration, dict) or configuration.keys() != CONFIGURATION or not isinstance(names, list):
-            raise InputError(f"a configuration with {sorted(CONFIGURATION)} and a list of names", repr(values))
-        if not isinstance(varies, bool):
-            raise InputError("variation as true or false", repr(varies))
-        arrays = {name: tensors[f"{i}/{name}"] for name in ARRAYS}
-        variation = Variation(**{name: tensors[f"{i}/variation/{name}"] for name in VARIATION}) if varies else None
-        rest = {"configuration": Configuration(**configuration), "names": tuple(names), "variation": variation}
-        primitives[label] = Primitive(**values | rest | arrays)
+        primitives[label] = _primitive(values, {name: tensors[f"{i}/{name}"] for name in _array_names(values)})
     return primitives
 
 
+def _primitive(values: dict[str, Any], arrays: Mapping[str, FloatArray]) -> Primitive:
+    """From the values and arrays by which `_values` and `_arrays` say it."""
+    configuration, names, channels = values["configuration"], values["names"], values["channels"]
+    if not isinstance(configuration, dict) or configuration.keys() != CONFIGURATION or not isinstance(names, list):
+        raise InputError(f"a configuration with {sorted(CONFIGURATION)} and a list of names", repr(values))
+    if not isinstance(values["variation"], bool) or not isinstance(channels, list):
+        raise InputError("variation as true or false, and channels as a list of names", repr(values))
+    parts = {part: {name: arrays[f"{part}/{name}"] for name in PARTS[part]} for part in PARTS if values[part]}
+    rest = {
+        "configuration": Configuration(**configuration),
+        "names": tuple(names),
+        "variation": Variation(**parts["variation"]) if "variation" in parts else None,
+        "channels": ChannelVariation(tuple(channels), **parts["channels"]) if "channels" in parts else None,
+    }
+    return Primitive(**values | rest | {name: arrays[name] for name in ARRAYS})
+
+
 def _tensor_names(given: Mapping[str, Any]) -> set[str]:
-    names = {f"{i}/{name}" for i in range(len(given)) for name in ARRAYS}
-    for i, (_, values) in enumerate(sorted(given.items())):
-        if isinstance(values, dict) and values.get("variation") is True:
-            names |= {f"{i}/variation/{name}" for name in VARIATION}
-    return names
+    return {f"{i}/{name}" for i, (_, values) in enumerate(sorted(given.items())) for name in _array_names(values)}
+
+
+def _array_names(values: Any) -> list[str]:
+    """The arrays of a primitive with these values, which need not be well-formed."""
+    present = {part: values.get(part) for part in PARTS} if isinstance(values, dict) else {}
+    parts = [part for part, value in present.items() if value is True or (isinstance(value, list) and value)]
+    return [*ARRAYS, *(f"{part}/{name}" for part in parts for name in PARTS[part])]
