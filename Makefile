@@ -42,7 +42,7 @@ build/gallery/%.png: examples/%.py $(SOURCES) | $(VENV)/.docs
 	mkdir -p build/gallery
 	MPLBACKEND=Agg $(BIN)/python $< $@ > $(@:.png=.txt)
 
-# Every picture in docs/images.
+# Every picture in docs/images, and the tables in docs/feedback.md; two minutes.
 figures: $(VENV)/.demo
 	$(BIN)/python docs/figures.py
 

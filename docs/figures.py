@@ -1,4 +1,4 @@
-"""Draws every picture of docs/images but that of n_basis: `make figures`."""
+"""Draws every picture of docs/images but that of n_basis, and writes the tables of docs/feedback.md: `make figures`."""
 
 import runpy
 from collections.abc import Callable
@@ -6,6 +6,8 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from feedback_figures import draw_displaced, draw_feedback_compared, draw_feedback_gains, draw_feedback_rest
+from feedback_tables import write_feedback_tables
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from movement_figures import draw_arm_movements, draw_letter_speeds, draw_letters
@@ -136,6 +138,10 @@ PICTURES: dict[str, Callable[[], Figure]] = {
     "letters": draw_letters,
     "letter_speeds": draw_letter_speeds,
     "arm_movements": draw_arm_movements,
+    "displaced": draw_displaced,
+    "feedback_gains": draw_feedback_gains,
+    "feedback_compared": draw_feedback_compared,
+    "feedback_rest": draw_feedback_rest,
 }
 
 
@@ -143,7 +149,10 @@ def main() -> None:
     with figure_style():
         for name, draw in PICTURES.items():
             draw().savefig(IMAGES / f"{name}.png", dpi=150)
-    runpy.run_path(str(EXAMPLES / "06_detect_a_failure.py"))["main"](IMAGES / "alarm.png")
+    write_feedback_tables()
+    pictures = {"06_detect_a_failure": "alarm", "12_tool_camera": "tool_camera", "13_how_it_should_feel": "how_it_feels"}
+    for example, name in pictures.items():
+        runpy.run_path(str(EXAMPLES / f"{example}.py"))["main"](IMAGES / f"{name}.png")
 
 
 if __name__ == "__main__":

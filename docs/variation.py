@@ -33,6 +33,8 @@ MODELS = {
     "– without deviations": JOINT | {"forcing_noise": "posterior"},
     "– goal conditioned on": JOINT | {"goal_handling": "condition"},
     "– goal as attractor": JOINT | {"goal_handling": "attractor"},
+    "– coupling: none": JOINT | {"coupling": "none"},
+    "– coupling: auto": JOINT | {"coupling": "auto"},
 }
 FEW = 20
 """Points of an execution at which it is seen, in the second column."""
@@ -90,7 +92,7 @@ def measure(name: str, folder: Path = RECORDINGS, classes: slice = slice(None)) 
             training = [d for i, d in enumerate(members) if i % FOLDS != fold]
             fitted: dict[str, Primitive] = {}
             for model, settings in MODELS.items():
-                kind = settings["weight_model"] + settings.get("forcing_noise", "")
+                kind = settings["weight_model"] + settings.get("forcing_noise", "") + settings.get("coupling", "")
                 if kind not in fitted:
                     fitted[kind] = ProbabilisticDMP(**settings).fit(training).primitive_
                 handling = settings.get("goal_handling", "blend")
