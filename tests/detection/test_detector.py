@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from detection.damage import JUNK, damaged, places, with_surplus
 from detection.verdicts import assert_same, task_of
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
@@ -122,6 +123,12 @@ def test_a_persistence_that_is_none_is_refused(varied, training, persistence):
         FailureDetector(persistence=persistence).fit(varied["s"], training["s"])
 
 
+@pytest.mark.parametrize("pooled", [None, 1, "yes", [True], np.nan], ids=repr)
+def test_pooled_is_yes_or_no(varied, training, pooled):
+    with pytest.raises(InputTypeError, match="Expected pooled as True or False, got"):
+        FailureDetector(pooled=pooled).fit(varied["s"], training["s"])
+
+
 def test_recordings_of_the_wrong_shape_are_refused(alone, varied, training):
     for use in (alone.verdicts, alone.predict, lambda given: FailureDetector().fit(varied["s"].primitive_, given)):
         for wrong in ([np.zeros((20, 3))], [np.zeros(20)], [np.zeros((0, 2))], np.zeros((2, 20, 3)), "letters", [None], 3):
@@ -205,47 +212,6 @@ def test_a_single_primitive_and_its_detector_in_one_file(tmp_path, varied, alone
 # --- damage -----------------------------------------------------------------------------------------------------------
 
 
-def places(state, path=()):
-    """The path of every piece of a state."""
-    yield path
-    items = state.items() if isinstance(state, dict) else enumerate(state[:2]) if isinstance(state, list) else ()
-    for key, value in items:
-        yield from places(value, (*path, key))
-
-
-def damaged(state, path, change):
-    """A copy with one piece taken away or replaced."""
-    if not path:
-        return change(state)
-    copy = dict(state) if isinstance(state, dict) else list(state)
-    if len(path) == 1 and change is None:
-        del copy[path[0]]
-    else:
-        copy[path[0]] = damaged(copy[path[0]], path[1:], change)
-    return copy
-
-
-JUNK = (
-    None,
-    True,
-    -1,
-    10**400,
-    float("nan"),
-    float("inf"),
-    1e300,
-    "",
-    "junk",
-    [],
-    [1, "x"],
-    {},
-    {"junk": 1},
-    [None, 1],
-    [[]],
-    (),
-    b"",
-)
-
-
 @pytest.fixture(scope="module")
 def states(alone, calibrated, varied, pooled_weights, training):
     """States of detectors, each with the primitives it is for."""
@@ -275,7 +241,7 @@ def test_a_damaged_state_is_refused_or_of_use(states, which, piece, kind, junk):
     if kind == "missing":
         broken = damaged(state, path, None)
     elif kind == "extra":
-        broken = damaged(state, path, lambda piece: {**piece, "surplus": 1} if isinstance(piece, dict) else [piece])
+        broken = damaged(state, path, with_surplus)
     else:
         broken = damaged(state, path, lambda _: JUNK[junk])
     try:

@@ -463,7 +463,7 @@ def test_an_empty_state_is_refused(learned):
     with pytest.raises(InputError, match="rule to be one of 'calibrated', 'paper', got None"):
         FailureDetector.from_state({}, {"": learned.primitive_})
     with pytest.raises(InputError, match="a detector with a likelihood and minima"):
-        FailureDetector.from_state({"rule": "paper"}, {"": learned.primitive_})
+        FailureDetector.from_state({"rule": "paper", "sensors": None}, {"": learned.primitive_})
 
 
 def test_a_state_for_other_primitives_is_refused(detector, library):

@@ -118,3 +118,41 @@ def test_a_silent_sensor_holds_up_nothing_for_long():
 def test_ticks_go_on_after_the_movement_should_be_over():
     ticks = run(np.arange(300.0)[:, None], DURATION / 100)
     np.testing.assert_allclose(numbers(ticks)[:, 0], np.arange(300), atol=1e-9)
+
+
+@given(seeds, st.integers(2, 30))
+def test_a_slow_sensor_is_waited_for(seed, every):
+    """As long as its samples usually are apart, and half as long again: then the path between them is straight too."""
+    rng = np.random.default_rng(seed)
+    n = 5 * every + 1
+    dt, values = DURATION / (n - 1), np.column_stack([np.cumsum(rng.standard_normal((n, 2)), axis=0)])
+    slow = np.array(values)
+    slow[np.arange(n) % every > 0, 1] = np.nan
+    at = np.arange(TICKS + 1) * (n - 1) / TICKS
+    found = run(slow, dt, [dt, every * dt])
+    expected = np.interp(at, np.arange(0, n, every), values[::every, 1])
+    np.testing.assert_allclose(numbers(found)[:, 1], expected[: len(found)], atol=1e-9)
+    assert len(found) == TICKS + 1
+    for tick, t in found:
+        assert t * dt * TICKS / DURATION - tick.number < max(every * dt * TICKS / DURATION, 3) + 1e-6
+
+
+def test_a_slow_sensor_that_is_late_holds_up_nothing_for_long():
+    values = np.column_stack([np.arange(201.0)] * 2)
+    values[np.arange(201) % 20 > 0, 1] = np.nan
+    values[60:, 1] = np.nan
+    found = run(values, DURATION / 200, [DURATION / 200, DURATION / 10])
+    assert max(t / 2 - tick.number for tick, t in found) == pytest.approx(15, abs=1)  # one and a half times ten ticks
+    np.testing.assert_allclose(numbers(found)[:21, 1], 2 * np.arange(21), atol=1e-9)
+    assert np.isnan(numbers(found)[21:, 1]).all()
+    np.testing.assert_allclose(numbers(found)[:, 0], 2 * np.arange(len(found)), atol=1e-9)
+
+
+def test_what_is_never_measured_is_not_waited_for():
+    """Every tick comes with the sample that completes it."""
+    values = np.column_stack([np.arange(150.0), np.full(150, np.nan)])
+    for tick, t in run(values, DURATION / 150, [DURATION / 150, np.inf]):
+        assert t == np.ceil(1.5 * tick.number - 1e-6)
+    nothing = np.full((101, 2), np.nan)
+    found = run(nothing, DURATION / 100, [np.inf, np.inf])
+    assert [(tick.number, t) for tick, t in found] == [(t, t) for t in range(101)]

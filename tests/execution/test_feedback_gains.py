@@ -120,7 +120,7 @@ def test_what_an_innovation_adds_to_the_command_it_takes_from_its_covariance(kin
         blind = values[: tick + 1].copy()
         blind[tick] = NAN
         unseen = commands(p, task, array, blind)[2][-1]
-        S = seen.sensed.innovation_covariance
+        S = seen.innovation_covariance
         taken = gains[tick] @ S @ gains[tick].mT
         variances = np.diagonal(unseen.covariance, axis1=-2, axis2=-1)
         unit = np.sqrt(variances[..., :, None] * variances[..., None, :]) + 1e-300

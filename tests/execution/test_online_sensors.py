@@ -62,10 +62,8 @@ def test_online_is_offline(kind, seed):
     np.testing.assert_allclose([s.contributions for s in steps], track.contributions, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose([s.log_likelihood for s in steps], track.log_likelihoods, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose([s.innovations for s in steps], track.innovations, rtol=1e-9, atol=1e-9)
-    np.testing.assert_array_equal([s.sensed.fused for s in steps], track.fused)
-    np.testing.assert_allclose(
-        [s.sensed.innovation_covariance for s in steps], track.innovation_covariances, rtol=1e-8, atol=1e-9
-    )
+    np.testing.assert_array_equal([s.fused for s in steps], track.fused)
+    np.testing.assert_allclose([s.innovation_covariance for s in steps], track.innovation_covariances, rtol=1e-8, atol=1e-9)
     for name, of_sensor in track.sensors.items():
         ratios = np.concatenate([s.sensors[name].test_ratios for s in steps])
         np.testing.assert_allclose(ratios, of_sensor.test_ratios, rtol=1e-8)
@@ -215,7 +213,7 @@ def test_of_several_outputs_one_outlier_rejects_the_reading():
     array = SensorArray(p, [state_sensor(p, "camera", "position", 0.05, gate=3.0)])
     near = roll_out(p, task, DT).positions[0]
     step = OnlineExecution(p, task, DT, sensors=array).step([near[0], near[1] + 1e3])
-    assert not step.sensed.fused.any()
+    assert not step.fused.any()
     assert step.log_likelihood == 0
     assert repr(step.sensors["camera"]) == "<SensorTrack: 0 readings used, 1 rejected, 0 missing>"
 
@@ -252,7 +250,7 @@ def test_with_none_the_command_is_the_plan(kind, seed):
         assert a.log_likelihood == b.log_likelihood
         np.testing.assert_array_equal(a.contributions, b.contributions)
         np.testing.assert_array_equal(a.innovations, b.innovations)
-        np.testing.assert_array_equal(a.sensed.fused, b.sensed.fused)
+        np.testing.assert_array_equal(a.fused, b.fused)
         assert {n: t.n_rejected for n, t in a.sensors.items()} == {n: t.n_rejected for n, t in b.sensors.items()}
 
 

@@ -191,10 +191,11 @@ class FailureDetector:
         """
         if not isinstance(state, Mapping):
             raise InputTypeError("the state of a detector as a mapping", f"{state!r:.100}")
-        if "sensors" not in state:
-            raise InputError("the state of a detector with the sensors it was fitted with", f"{state!r:.200}")
         parts = dict(state)
-        rule, plain = check_choice(parts.pop("rule", None), "rule", RULES), parts.pop("sensors", None)
+        rule = check_choice(parts.pop("rule", None), "rule", RULES)
+        if "sensors" not in parts:
+            raise InputError("the state of a detector with the sensors it was fitted with", f"{state!r:.200}")
+        plain = parts.pop("sensors")
         detector = cls(rule=rule)
         detector.primitives_ = dict(primitives)
         sensors = None if plain is None else sensors_from_plain(plain, next(iter(primitives.values())))

@@ -35,15 +35,16 @@ class PhaseClock:
 
     Parameters
     ----------
-    usual_gaps : (S,) array, seconds: how far apart the samples of each signal are.
+    usual_gaps : (S,) array, seconds: how far apart the samples of each signal are; infinite for what is never measured.
     duration, dt : seconds, of the movement and between samples.
     """
 
     def __init__(self, usual_gaps: FloatArray, duration: float, dt: float) -> None:
         self._rate = TICKS / duration
-        # What is never measured is not waited for.
-        gaps = 1.5 * np.where(np.isfinite(usual_gaps), usual_gaps, 0.0) * self._rate
+        measured = np.isfinite(usual_gaps)
+        gaps = 1.5 * np.where(measured, usual_gaps, 0.0) * self._rate
         self._longest_gaps = np.maximum(max(LONGEST_GAP, 2.5 * dt * self._rate), gaps)
+        self._patience = np.where(measured, self._longest_gaps, -np.inf)  # what is never measured is not waited for
         self._last_times = np.full(len(usual_gaps), -np.inf)
         self._last_values = np.full(len(usual_gaps), np.nan)
         self._pending: list[Tick] = []
@@ -71,7 +72,7 @@ class PhaseClock:
         self._last_values = np.where(seen, values, self._last_values)
         ready = 0
         for tick in self._pending:
-            if np.any(np.isnan(tick.values) & (now - tick.number < self._longest_gaps)):
+            if np.any(np.isnan(tick.values) & (now - tick.number < self._patience)):
                 break
             ready += 1
         done, self._pending = self._pending[:ready], self._pending[ready:]

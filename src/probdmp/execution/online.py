@@ -11,14 +11,14 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from probdmp.checks import FloatArray, check_choice, check_number, check_seconds, freeze_arrays
+from probdmp.checks import BoolArray, FloatArray, check_choice, check_number, check_seconds, freeze_arrays
 from probdmp.dmp import Primitive, Task, step_count
 from probdmp.dmp.phase import phases_at
 from probdmp.dmp.transformation_system import ACCELERATION, POSITION, VELOCITY
 from probdmp.execution.readings import observation_of
 from probdmp.execution.sensor_array import SensorArray
-from probdmp.execution.sensor_reports import SensorCounts, SensorTrack, tracks_of_tick
-from probdmp.execution.step_filters import STEP_FILTERS, Sensed, StepFilter
+from probdmp.execution.sensor_reports import SensorCounts, SensorTrack, sensor_tracks
+from probdmp.execution.step_filters import STEP_FILTERS, StepFilter
 from probdmp.execution.trajectory import GaussianChannel, channels_of
 
 __all__ = ["ExecutionStep", "Judgement", "Monitor", "Observed", "OnlineExecution"]
@@ -107,8 +107,10 @@ class ExecutionStep:
     """What the detector says so far; None without a detector."""
     channels: Mapping[str, GaussianChannel]
     """What the learned channels should read at the next tick, by name, of one time each."""
-    sensed: Sensed
-    """What the sensors said, in full."""
+    innovation_covariance: FloatArray
+    """(O, O) array, units of the outputs multiplied: covariance of the innovations, seen or not."""
+    fused: BoolArray
+    """(O,) array: what was seen and believed."""
     array: SensorArray
     """The sensors."""
 
@@ -118,7 +120,7 @@ class ExecutionStep:
     @property
     def sensors(self) -> dict[str, SensorTrack]:
         """By name of each sensor: its innovation at this tick, how surprising it was, whether it was rejected."""
-        return tracks_of_tick(self.array, self.sensed)
+        return sensor_tracks(self.array, self.innovations[None], self.innovation_covariance[None], self.fused[None])
 
 
 class OnlineExecution:
@@ -255,7 +257,8 @@ class OnlineExecution:
             test_ratio=test_ratio,
             verdict=self.verdict,
             channels=channels_of(self.primitive, mean[None], covariance[None]),
-            sensed=seen,
+            innovation_covariance=seen.innovation_covariance,
+            fused=seen.fused,
             array=self.array,
         )
 

@@ -1,7 +1,6 @@
 """What each sensor said, and whether it was believed."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,10 +8,7 @@ from probdmp.checks import BoolArray, FloatArray
 from probdmp.execution.gating import gate_ratios
 from probdmp.execution.sensor_array import SensorArray
 
-if TYPE_CHECKING:
-    from probdmp.execution.step_filters import Sensed
-
-__all__ = ["SensorCounts", "SensorTrack", "sensor_tracks", "tracks_of_tick"]
+__all__ = ["SensorCounts", "SensorTrack", "sensor_tracks"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,11 +58,6 @@ def sensor_tracks(
         ratios = gate_ratios(own, spread, sensor.gate)
         tracks[sensor.name] = SensorTrack(own, spread, ratios, used, np.logical_and(measured, ~used))
     return tracks
-
-
-def tracks_of_tick(array: SensorArray, sensed: "Sensed") -> dict[str, SensorTrack]:
-    """The same of one tick, T = 1."""
-    return sensor_tracks(array, sensed.innovations[None], sensed.innovation_covariance[None], sensed.fused[None])
 
 
 @dataclass(slots=True)
