@@ -247,8 +247,8 @@ def lossy(recording):
 )
 def test_innovations_are_of_all_outputs(learned, training, fresh, arguments):
     sensors = [encoders(learned), tacho(learned, gate=5.0)]
-    judge = FailureDetector(0.1, **arguments).fit(learned, training[:4], sensors=sensors)
-    chosen = [fresh[0], lying(fresh[1], 3.0), held(fresh[2])]
+    judge = FailureDetector(0.1, **arguments).fit(learned, training[:3], sensors=sensors)
+    chosen = [lying(fresh[1], 3.0), held(fresh[2])]
     for recording, verdict in zip(chosen, judge.verdicts(chosen), strict=True):
         assert verdict.names == ("x", "y", "velocity_x", "velocity_y")
         task = task_of(learned.primitive_, recording, False)
@@ -452,12 +452,12 @@ def test_one_of_several_positions_may_be_unmeasured(arm, reaches):
     sensors = [encoder, planar_arm_sensor("camera", LINKS, CAMERA_STD)]
     detector = held_out(arm, reaches[:TRAINED], sensors, persistence=3)
     assert np.all(detector.rule_.calibrations[False][""].maxima[:, [0, 1, -1]] > 0)
-    fresh = reaches[TRAINED:]
-    pushed = [replace(d, positions=fault_named("push:0.8")(d.positions, 30, generator(k))) for k, d in enumerate(fresh)]
-    found = [detector.verdicts(given) for given in (fresh[:2], [displaced(d) for d in fresh], pushed)]
+    fresh = reaches[TRAINED:][:3]
+    pushed = [replace(d, positions=fault_named("push:0.8")(d.positions, 20, generator(k))) for k, d in enumerate(fresh)]
+    found = [detector.verdicts(given) for given in (fresh, [displaced(d) for d in fresh], pushed)]
     assert not any(v.kind in ("data missing", "sensor") or v.is_stale for verdicts in found for v in verdicts)
     assert all(v.failed for verdicts in found[1:] for v in verdicts)
-    assert sum(v.blamed == "+camera_x" for v in found[1]) >= JUDGED - 2
+    assert sum(v.blamed == "+camera_x" for v in found[1]) >= 2
     task = task_of(arm.primitive_, pushed[0], False)
     assert_same(run_online(arm.primitive_, task, pushed[0], detector)[0].verdict, found[2][0])
 
@@ -473,7 +473,7 @@ def test_a_camera_that_is_slower_than_the_ticks_is_heard_all_the_same(arm, camer
     times = []
     for persistence in (1, 2, 4):
         detector = held_out(arm, taught[:5], [camera], persistence=persistence)
-        found = detector.verdicts([rarely(displaced(d)) for d in fresh])
+        found = detector.verdicts([rarely(displaced(d)) for d in fresh[:3]])
         assert all(v.failed and v.channel == "camera" for v in found)
         times.append(np.median([v.time for v in found]))
     assert times[0] <= times[1] <= times[2] <= times[0] + 0.1  # a frame later
@@ -481,9 +481,9 @@ def test_a_camera_that_is_slower_than_the_ticks_is_heard_all_the_same(arm, camer
         arm.primitive_, [task_of(arm.primitive_, fresh[0], True)], [rarely(fresh[0], lost=0.6)]
     )
     values = np.array([value[-1] for observed in ticks for value in source.update(observed)])
-    last = 100 * 0.6 / fresh[0].duration
+    last = 100 * 18 * DT / fresh[0].duration  # tick of the last frame
     assert np.isfinite(values[: int(last)]).all()
-    assert np.isnan(values[int(last + 100 * NIS_WINDOW) + 2 :]).all()
+    assert np.isnan(values[int(last + 100 * (NIS_WINDOW + DT / fresh[0].duration)) + 1 :]).all()
 
 
 # --- files ------------------------------------------------------------------------------------------------------------
@@ -542,7 +542,7 @@ def test_damaged_sensors_are_refused_or_of_use(both, learned, fresh, watched, ar
         "camera": (watched, arm.primitive_, reaches[-1]),
     }[of]
     state, n_refused = detector.state(), 0
-    for path in [path for path in places(state["sensors"])]:
+    for path in places(state["sensors"]):
         changes = [with_surplus, *(lambda _, junk=junk: junk for junk in JUNK)]
         can_be_missing = not path or isinstance(path[-1], int)  # with fewer sensors, or outputs, there are just fewer
         for change in changes if can_be_missing else [None, *changes]:

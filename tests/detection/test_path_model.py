@@ -1,7 +1,10 @@
 """What is known about a path before it begins, against dense Gaussian conditioning."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from strategies import make_joint_primitive
 
 from probdmp.detection.path_model import CLOCK_SHARE, CLOCK_STD, NOISE_FLOOR, path_model
 from probdmp.detection.phase_clock import TICKS
@@ -79,3 +82,46 @@ def test_covariances_are_those_of_something(primitive, profile, knows_goal):
     np.testing.assert_allclose(covariance, covariance.T, atol=1e-12)
     assert np.linalg.eigvalsh(covariance).min() > -1e-9
     np.testing.assert_allclose(covariance[:2], 0, atol=1e-12)  # displacements count from the start
+
+
+# --- with sensor channels ---------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def felt():
+    """A random movement with a force that varies with it, and what its demonstrations have shown."""
+    felt = make_joint_primitive(np.random.default_rng(3), 2, channels=("force",))
+    shown = [np.asarray(0.1), *np.array([[0.02, 0.03, 0.01], [0, 0, 0], [0.1, 0.1, 0.1], [0.01, 0.01, 0.05]])]
+    return felt, ExecutionProfile(*shown), ExecutionProfile(shown[0], *[each[:2] for each in shown[1:]])
+
+
+@pytest.mark.parametrize("told", [True, False])
+def test_channels_stand_beside_the_movement_as_they_are(felt, told):
+    """They change nothing of it, and count from zero; a goal moves them as far as they vary with it."""
+    primitive, profile, of_positions = felt
+    whole = path_model(primitive, profile, told)
+    movement, bare = whole.of_movement(), path_model(replace(primitive, channels=None), of_positions, told)
+    for name in ("means", "covariance", "goal_gains", "noise_variances"):
+        np.testing.assert_allclose(getattr(movement, name), getattr(bare, name), rtol=1e-9, atol=1e-9, err_msg=name)
+    path = path_distribution(primitive, TICKS + 1)
+    np.testing.assert_allclose(whole.means[:, 2], path.means[:, 2] / primitive.signals.ranges[2], rtol=1e-9)
+    assert whole.noise_variances[2] == pytest.approx((0.01 / primitive.signals.ranges[2]) ** 2 + NOISE_FLOOR**2)
+    assert np.any(whole.goal_gains[:, 2] != 0) == told
+
+
+def test_a_goal_tells_of_a_channel_what_conditioning_says(felt):
+    """Dense: the channel at every tick given the noisy end of the movement."""
+    primitive, profile, _ = felt
+    told, mean_path = path_model(primitive, profile, True), path_distribution(primitive, TICKS + 1)
+    ranges = primitive.signals.ranges
+    joint = mean_path.covariance / np.multiply.outer(ranges, ranges)[:, None, :]
+    end = joint[-1, :2, -1, :2] + np.diag(told.noise_variances[:2])
+    gain = joint[:, 2, -1, :2] @ np.linalg.inv(end)
+    np.testing.assert_allclose(told.goal_gains[:, 2], gain, rtol=1e-7, atol=1e-9)
+    goal = mean_path.means[-1, :2] / primitive.ranges + [0.2, -0.1]
+    expected = mean_path.means[:, 2] / ranges[2] + gain @ [0.2, -0.1]
+    np.testing.assert_allclose(told.means_for(goal[None])[0, :, 2], expected, rtol=1e-9, atol=1e-9)
+    left = joint[:, 2, :, 2] - gain @ joint[-1, :2, :, 2]
+    slopes = max(CLOCK_STD, CLOCK_SHARE * TICKS * primitive.phase_step) * np.gradient(mean_path.means[:, 2] / ranges[2])
+    off = np.diag(np.where(np.arange(TICKS + 1) > 0, slopes**2, 0.0))  # each sample may be off its time
+    np.testing.assert_allclose(told.covariance[:, 2, :, 2], left + off, rtol=1e-7, atol=1e-9)

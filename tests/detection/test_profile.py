@@ -37,6 +37,33 @@ def test_repeats_and_jumps_are_the_largest_of_all():
     assert profile.largest_jumps[0] < 0.3
 
 
+def test_usual_gaps_are_the_longest_of_usual_ones():
+    """In seconds, the median of each recording; one that was lost now and then is no slower; infinite if hardly measured."""
+    rng = np.random.default_rng(0)
+    walks = [np.cumsum(rng.standard_normal((41, 4)), axis=0) for _ in range(2)]
+    for every, walk in zip((4, 5), walks, strict=True):
+        walk[np.arange(41) % every > 0, 1] = np.nan
+        walk[rng.random(41) < 0.2, 2] = np.nan
+        walk[1:, 3] = np.nan
+    profile = ExecutionProfile.of([recording(walk) for walk in walks])
+    np.testing.assert_allclose(profile.usual_gaps, [0.1, 0.5, 0.1, np.inf])
+    np.testing.assert_array_equal(ExecutionProfile.from_state(profile.state(), 4).usual_gaps, profile.usual_gaps)
+    assert profile.state()["usual_gaps"][3] is None  # JSON knows no infinity
+    for name in ("noise_stds", "longest_repeats", "largest_jumps"):
+        assert np.isfinite(getattr(profile, name)).all()
+
+
+def test_signals_may_be_others_than_positions():
+    """All that is measured as it is, at the samples of the recording."""
+    demos = [recording(np.random.default_rng(k).standard_normal((21, 2))) for k in range(3)]
+    felt = [np.column_stack([d.positions, 5 + d.positions[:, 0]]) for d in demos]
+    profile, bare = ExecutionProfile.of(demos, felt), ExecutionProfile.of(demos)
+    for name in ("noise_stds", "longest_repeats", "largest_jumps", "usual_gaps"):
+        np.testing.assert_array_equal(getattr(profile, name)[:2], getattr(bare, name))
+        np.testing.assert_allclose(getattr(profile, name)[2], getattr(bare, name)[0])
+    assert profile.tempo_std == bare.tempo_std
+
+
 def test_missing_samples_hide_nothing_else(training):
     lossy = []
     for k, d in enumerate(training["s"]):

@@ -129,6 +129,49 @@ def test_silence_is_stale_until_something_is_heard(lost):
     assert sensors.cause == ""
 
 
+@pytest.mark.parametrize(("usual", "longest"), [(0.01, 10), (0.04, 10), (0.1, 20), (0.2, 40)])
+def test_a_slow_sensor_may_be_silent_for_twice_as_long_as_usual(usual, longest):
+    """But a tenth of the duration in any case."""
+    sensors, samples = watch(usual_gaps=np.array([DT, usual])), movement(np.random.default_rng(0))
+    samples[np.arange(100) % round(usual / DT) > 0, 1] = np.nan
+    samples[41:, 1] = np.nan
+    stale = []
+    for sample in samples:
+        sensors.believe(sample)
+        stale.append(sensors.is_stale)
+    np.testing.assert_array_equal(np.flatnonzero(stale), np.arange(41 + longest, 100))
+
+
+def test_what_was_never_measured_is_not_missed():
+    sensors, samples = watch(usual_gaps=np.array([DT, np.inf])), movement(np.random.default_rng(0))
+    samples[:, 1] = np.nan
+    np.testing.assert_array_equal(believed(sensors, samples), samples)
+    assert (sensors.is_stale, sensors.staleness, sensors.cause) == (False, 0.0, "")
+
+
+def test_a_channel_may_be_constant_for_as_long_as_it_likes():
+    """A force rests, or is at its limit; a position that repeats exactly is stuck, even if the force does so too."""
+    samples = movement(np.random.default_rng(0))
+    samples[:, 1] = 0.1
+    sensors = watch(n_dof=1)
+    np.testing.assert_array_equal(believed(sensors, samples), samples)
+    assert (sensors.cause, sensors.ratio, sensors.shares.tolist()) == ("", 0.0, [0.0, 0.0])
+    samples[50:, 0] = samples[49, 0]
+    believed(sensors, samples[50:])
+    assert sensors.cause == "stuck"
+    assert sensors.shares[0] > 1
+    assert sensors.shares[1] == 0
+
+
+def test_spikes_of_a_channel_are_spikes():
+    samples, sensors = movement(np.random.default_rng(0)), watch(n_dof=1)
+    samples[[20, 40, 60], 1] += RANGES[1]
+    found = believed(sensors, samples)
+    assert np.flatnonzero(np.isnan(found[:, 1])).tolist() == [20, 40, 60]
+    assert sensors.cause == "spikes"
+    assert sensors.shares[1] > sensors.shares[0] == 0
+
+
 def test_after_a_gap_there_is_no_line_to_compare_with():
     samples, sensors = movement(np.random.default_rng(0)), watch()
     samples[30:50] = np.nan
