@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from probdmp.checks import check_choice
 from probdmp.demonstrations import Demonstration, Recordings, as_demonstrations
+from probdmp.detection.batch import BatchJudgement
 from probdmp.detection.calibrated_monitor import CalibratedMonitor
 from probdmp.detection.calibrated_rule import CalibratedRule
 from probdmp.detection.calibration_facts import CalibrationFacts
@@ -18,9 +19,9 @@ from probdmp.detection.paper_rule import PaperRule
 from probdmp.detection.thresholds import PaperThreshold
 from probdmp.detection.trajectory_family import tells_goal
 from probdmp.detection.verdict import Verdict
-from probdmp.dmp import Primitive, Task
+from probdmp.dmp import Primitive, Task, unstack_tasks
 from probdmp.errors import InputError, InputTypeError, NotFittedError
-from probdmp.execution import Observed, Sensor, SensorArray, check_tasks
+from probdmp.execution import ExecutionBatch, Observed, Sensor, SensorArray, check_tasks
 from probdmp.execution.plain_sensors import sensors_as_plain, sensors_from_plain
 
 __all__ = ["FailureDetector"]
@@ -168,6 +169,18 @@ class FailureDetector:
                     monitor.update(observed)
                 verdicts[k] = monitor.verdict
         return [verdicts[k] for k in range(len(recordings))]
+
+    def judge(self, primitive: Primitive, batch: ExecutionBatch) -> BatchJudgement:
+        """Verdicts on many executions of one primitive at once, as arrays; those of `verdicts` are the same."""
+        self._fitted()
+        sensors = SensorArray(primitive, self.sensors_)
+        recordings = list(batch.recordings(sensors))
+        verdicts = []
+        for monitor, ticks in self.replay(primitive, unstack_tasks(batch.tasks), recordings):
+            for observed in ticks:
+                monitor.update(observed)
+            verdicts.append(monitor.verdict)
+        return BatchJudgement.of(verdicts)
 
     def predict(
         self, executions: Recordings, dt: float | None = None, tasks: Sequence[Task] | None = None

@@ -9,7 +9,7 @@ from probdmp.checks import SECONDS, FloatArray, check_array, frozen, shape_text
 from probdmp.demonstrations import Demonstration
 from probdmp.errors import InputError
 
-__all__ = ["Task", "demonstrated_tasks", "stack_tasks"]
+__all__ = ["Task", "demonstrated_tasks", "stack_tasks", "unstack_tasks"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,6 +53,13 @@ def stack_tasks(tasks: Sequence[Task]) -> Task:
         np.stack([t.duration for t in tasks]),
         np.stack([unknown if t.start_velocity is None else t.start_velocity for t in tasks]),
     )
+
+
+def unstack_tasks(tasks: Task) -> list[Task]:
+    """Each of a batch (N) of tasks by itself."""
+    velocities = [None] * len(tasks.duration) if tasks.start_velocity is None else tasks.start_velocity
+    rows = zip(tasks.start, tasks.goal, tasks.duration, velocities, strict=True)
+    return [Task(start, goal, duration, velocity) for start, goal, duration, velocity in rows]
 
 
 def demonstrated_tasks(demonstrations: Sequence[Demonstration]) -> Task:

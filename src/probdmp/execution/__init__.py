@@ -1,5 +1,6 @@
 """Running a primitive: rollout, tracking, smoothing and sampling of recordings, online execution."""
 
+from probdmp.execution.execution_batch import ExecutionBatch, score_batch
 from probdmp.execution.feedback_gains import feedback_gains
 from probdmp.execution.online import ExecutionStep, Judgement, Monitor, Observed, OnlineExecution
 from probdmp.execution.plain_sensors import sensors_as_plain, sensors_from_plain
@@ -23,6 +24,7 @@ from probdmp.execution.trajectory import GaussianChannel, GaussianTrajectory, Tr
 
 __all__ = [
     "ChannelSensor",
+    "ExecutionBatch",
     "ExecutionStep",
     "GaussianChannel",
     "GaussianTrajectory",
@@ -52,6 +54,7 @@ __all__ = [
     "sample_recordings",
     "sample_states",
     "sample_trajectories",
+    "score_batch",
     "score_recordings",
     "sensors_as_plain",
     "sensors_from_plain",
