@@ -116,7 +116,7 @@ def test_missing_observation_is_prediction_only(model, seed):
     for t in np.flatnonzero(gap[1:]) + 1:
         before = result.filtered.means[t - 1], result.filtered.covariances[t - 1]
         mean, covariance = predict(*before, model.transition, drifts[t - 1], noises[t - 1])
-        np.testing.assert_array_equal(result.filtered.means[t], mean)
+        np.testing.assert_allclose(result.filtered.means[t], mean, rtol=1e-12, atol=1e-14)
         np.testing.assert_allclose(result.filtered.covariances[t], covariance, rtol=1e-12, atol=1e-14)
 
 
@@ -288,7 +288,8 @@ def test_step_by_step_is_the_same_as_all_at_once(model, seed):
         seen = AffineObservation(observation, model.observation_matrix, model.observation_covariance)
         step = update(mean, covariance, seen)
         mean, covariance = step.mean, step.covariance
-        np.testing.assert_allclose(np.broadcast_to(mean, result.filtered.means[t].shape), result.filtered.means[t], rtol=1e-12)
+        expected = np.broadcast_to(mean, result.filtered.means[t].shape)
+        np.testing.assert_allclose(result.filtered.means[t], expected, rtol=1e-12, atol=1e-12)
         np.testing.assert_allclose(step.log_likelihood, result.log_likelihoods[t], rtol=1e-12, atol=1e-12)
 
 

@@ -104,4 +104,8 @@ def _forward(system: LinearGaussianModel, observed: FloatArray, array: SensorArr
         observation = by_group if array.is_coupled else array.flat(by_group.reshape(*by_group.shape[:-2], -1))
         return look_through(array, observation, mean, covariance)
 
-    return filter_sequence(system, observed if array.is_coupled else array.grouped(observed), look)
+    grouped = observed if array.is_coupled else array.grouped(observed)
+    if array.is_adaptive:
+        return filter_sequence(system, grouped, look)
+    silent = array.silent if array.is_coupled else array.grouped(np.where(array.silent, 1.0, 0.0)) == 1.0
+    return filter_sequence(system, np.where(silent, np.nan, grouped))

@@ -14,6 +14,7 @@ from probdmp.gaussian.filtering import AffineObservation, FilteredSequence, filt
 from probdmp.gaussian.linearization import Linearization, linearize_extended, linearize_unscented, wrapped
 from probdmp.gaussian.model import GaussianSequence, LinearGaussianModel
 from probdmp.gaussian.sampling import sample_sequences
+from probdmp.gaussian.series import SharedGains, score_series, shared_gains, smooth_series
 from probdmp.gaussian.smoothing import smooth_sequence
 from probdmp.gaussian.static import Belief, StaticUpdate, linear_moments, observe, unit_belief
 
@@ -26,6 +27,7 @@ __all__ = [
     "GaussianSequence",
     "LinearGaussianModel",
     "Linearization",
+    "SharedGains",
     "StaticUpdate",
     "block_diagonal",
     "couple_systems",
@@ -41,8 +43,11 @@ __all__ = [
     "predict",
     "predict_deviation",
     "sample_sequences",
+    "score_series",
+    "shared_gains",
     "smooth_deviations",
     "smooth_sequence",
+    "smooth_series",
     "unit_belief",
     "update",
     "wrapped",

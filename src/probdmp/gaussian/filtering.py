@@ -18,6 +18,7 @@ import numpy as np
 from probdmp.checks import BoolArray, FloatArray
 from probdmp.gaussian.density import gaussian_log_density, invert_covariance
 from probdmp.gaussian.model import GaussianSequence, LinearGaussianModel
+from probdmp.gaussian.scalar_systems import filter_scalar_systems, is_scalar, scalar_systems
 
 __all__ = ["AffineObservation", "FilteredSequence", "Update", "filter_sequence", "predict", "update"]
 
@@ -52,12 +53,8 @@ class Update(NamedTuple):
     """S, (*batch, O, O), whether seen or not."""
     fused: BoolArray
     """(*batch, O): what was seen and believed."""
-    score: FloatArray
-    """C^T S^-1 e, (*batch, n): the gradient of the log-likelihood with respect to m-."""
-    information: FloatArray
-    """C^T S^-1 C, (*batch, n, n)."""
-    retention: FloatArray
-    """I - K C, (*batch, n, n): what the update leaves of an error in m-."""
+    gain: FloatArray
+    """K, (*batch, n, O); 0 for what was not fused."""
     log_likelihood: FloatArray
     """ln N(o; C m-, S) over what was seen and believed, (*batch); 0 where nothing was."""
 
@@ -75,12 +72,10 @@ class FilteredSequence(NamedTuple):
     """(T, *batch, O) array: what was seen and believed."""
     log_likelihoods: FloatArray
     """(T, *batch) array, nats: density of what was seen at each time given the past."""
-    scores: FloatArray
-    """(T, *batch, n) array, see `Update`."""
-    informations: FloatArray
-    """(T, *batch, n, n) array, see `Update`."""
-    retentions: FloatArray
-    """(T, *batch, n, n) array, see `Update`."""
+    gains: FloatArray
+    """K, (T, *batch, n, O) array; 0 for what was not fused."""
+    matrices: FloatArray
+    """C, (T, *batch, O, n) array."""
 
 
 def predict(
@@ -130,9 +125,7 @@ def update(mean: FloatArray, covariance: FloatArray, observation: AffineObservat
         innovation,
         innovation_covariance,
         seen,
-        np.matmul(weighted, residual[..., None])[..., 0],
-        weighted @ c,
-        retention,
+        gain,
         gaussian_log_density(residual, precision, log_determinant, np.sum(seen, axis=-1).astype(np.float64)),
     )
 
@@ -154,21 +147,44 @@ def filter_sequence(
         If the model is not finite, R not positive definite, or the shape of `observations` does not fit.
     """
     model.check()
-    observed, batch, n_states = model.check_observations(observations), model.batch_shape, model.transition.shape[-1]
+    observed = model.check_observations(observations)
+    if look is None and is_scalar(model):
+        return _filter_scalar(model, observed)
+    return _filter_any(model, observed, look)
+
+
+def _filter_scalar(model: LinearGaussianModel, observed: FloatArray) -> FilteredSequence:
+    """Systems with one input and one sensor, by the kernels."""
+    batch, n = model.batch_shape, model.transition.shape[-1]
+    found = filter_scalar_systems(scalar_systems(model), observed.reshape(len(observed), -1))
+    shape = (len(observed), *batch)
+    return FilteredSequence(
+        GaussianSequence(found.means.reshape(*shape, n), found.covariances.reshape(*shape, n, n)),
+        found.innovations.reshape(*shape, 1),
+        found.variances.reshape(*shape, 1, 1),
+        ~np.isnan(observed),
+        found.log_likelihoods.reshape(shape),
+        found.gains.reshape(*shape, n, 1),
+        np.broadcast_to(model.observation_matrix, (*shape, 1, n)),
+    )
+
+
+def _filter_any(model: LinearGaussianModel, observed: FloatArray, look: Look | None) -> FilteredSequence:
+    batch, n_states = model.batch_shape, model.transition.shape[-1]
     drifts, process_covariances = model.drifts(), model.process_covariances()
     mean = np.broadcast_to(model.initial_mean, (*batch, n_states))
     covariance = np.broadcast_to(model.initial_covariance, (*batch, n_states, n_states))
-    steps = []
+    steps, matrices = [], []
     for t in range(model.n_steps):
         if t > 0:  # u[t-1] drives s[t-1] to s[t]
             mean, covariance = predict(mean, covariance, model.transition, drifts[t - 1], process_covariances[t - 1])
-        if look is None:
-            seen = AffineObservation(observed[t], model.observation_matrix, model.observation_covariance)
-        else:
+        seen = AffineObservation(observed[t], model.observation_matrix, model.observation_covariance)
+        if look is not None:
             seen = look(mean, covariance, observed[t])
         step = update(mean, covariance, seen)
         mean, covariance = step.mean, step.covariance
         steps.append(step)
+        matrices.append(np.broadcast_to(seen.matrix, (*batch, *seen.matrix.shape[-2:])))
     stacked = Update(*(np.stack(column) for column in zip(*steps, strict=True)))
     return FilteredSequence(
         GaussianSequence(stacked.mean, stacked.covariance),
@@ -176,7 +192,6 @@ def filter_sequence(
         stacked.innovation_covariance,
         stacked.fused,
         stacked.log_likelihood,
-        stacked.score,
-        stacked.information,
-        stacked.retention,
+        stacked.gain,
+        np.stack(matrices),
     )

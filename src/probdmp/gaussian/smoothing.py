@@ -12,6 +12,7 @@ Bryson-Frazier form; Durbin & Koopman, Time Series Analysis by State Space Metho
 import numpy as np
 
 from probdmp.checks import FloatArray
+from probdmp.gaussian.density import invert_covariance
 from probdmp.gaussian.filtering import FilteredSequence, filter_sequence
 from probdmp.gaussian.model import GaussianSequence, LinearGaussianModel
 
@@ -31,12 +32,19 @@ def smooth_sequence(model: LinearGaussianModel, observations: FloatArray) -> Gau
 def smooth_filtered(model: LinearGaussianModel, forward: FilteredSequence) -> GaussianSequence:
     """The backward pass alone, for a recording that has been filtered with the same model."""
     a, (means, covariances) = model.transition, forward.filtered
+    # What was not fused has a zero row in C and a unit variance, as in the filter.
+    fused, identity = forward.fused, np.eye(forward.fused.shape[-1])
+    c = np.where(fused[..., None], forward.matrices, 0.0)
+    s = np.where(fused[..., :, None] & fused[..., None, :], forward.innovation_covariances, identity)
+    weighted = c.mT @ invert_covariance(s)[0]  # C^T S^-1
+    scores = np.matmul(weighted, np.where(fused, forward.innovations, 0.0)[..., None])[..., 0]
+    informations, retentions = weighted @ c, np.eye(a.shape[-1]) - forward.gains @ c
     smoothed_means, smoothed_covariances = means.copy(), covariances.copy()
     score, information = np.zeros_like(means[0]), np.zeros_like(covariances[0])
     for t in range(model.n_steps - 1, 0, -1):
-        kept = forward.retentions[t]
-        score = np.matmul(a.mT, (forward.scores[t] + np.matmul(kept.mT, score[..., None])[..., 0])[..., None])[..., 0]
-        information = a.mT @ (forward.informations[t] + kept.mT @ information @ kept) @ a
+        kept = retentions[t]
+        score = np.matmul(a.mT, (scores[t] + np.matmul(kept.mT, score[..., None])[..., 0])[..., None])[..., 0]
+        information = a.mT @ (informations[t] + kept.mT @ information @ kept) @ a
         v = covariances[t - 1]
         smoothed_means[t - 1] += np.matmul(v, score[..., None])[..., 0]
         correction = v @ information @ v

@@ -1,0 +1,595 @@
+/* Kalman filtering of many scalar-observation systems: the loops of probdmp.gaussian, compiled.
+
+   s[t] = A s[t-1] + drift[t-1] + b e[t-1],  e ~ N(0, u[t-1]),    o[t] = c s[t] + v[t],  v ~ N(0, r)
+
+   _kernels_numpy.py says the same in NumPy, function by function, and is what this file is tested against; kernels.py chooses
+   between the two. Arrays are float64 and C-contiguous; what is written to is allocated by the caller. NaN marks what was not
+   observed. Functions release the GIL. Limited API of Python 3.11.
+
+   The file includes itself for its loops, which are compiled for any processor, and for those with AVX2, which is chosen at run
+   time: NAMED says which of the two.
+*/
+#ifndef NAMED
+#define PY_SSIZE_T_CLEAN
+#include <Python.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#if defined(__GNUC__)
+#define INLINE static inline __attribute__((always_inline))
+#else
+#define INLINE static inline
+#endif
+
+#define MOST_STATES 4
+#define TILE 512 /* observations of each that are brought side by side at a time */
+#define LOG_2PI 1.8378770664093453
+
+/* ---- Arrays ------------------------------------------------------------------------------------------------------------- */
+
+typedef struct {
+    const char *name;
+    int is_output;
+    int ndim;
+} Spec;
+
+typedef struct {
+    Py_buffer view;
+    double *data;
+} Array;
+
+static void release(Array *arrays, int count)
+{
+    for (int i = 0; i < count; i++) PyBuffer_Release(&arrays[i].view);
+}
+
+/* All arguments as arrays of float64 with the number of axes that the specs say. */
+static int take(PyObject *const *arguments, Py_ssize_t given, const Spec *specs, int count, Array *arrays)
+{
+    if (given != count) {
+        PyErr_Format(PyExc_TypeError, "expected %d arrays, got %zd", count, given);
+        return -1;
+    }
+    for (int i = 0; i < count; i++) {
+        int flags = PyBUF_C_CONTIGUOUS | PyBUF_FORMAT | (specs[i].is_output ? PyBUF_WRITABLE : 0);
+        if (PyObject_GetBuffer(arguments[i], &arrays[i].view, flags) < 0) {
+            release(arrays, i);
+            return -1;
+        }
+        const Py_buffer *view = &arrays[i].view;
+        if (view->ndim != specs[i].ndim || view->itemsize != sizeof(double) || !view->format || strcmp(view->format, "d")) {
+            PyErr_Format(PyExc_ValueError, "%s: expected float64 with %d axes, got %d axes of format %s", specs[i].name,
+                         specs[i].ndim, view->ndim, view->format ? view->format : "B");
+            release(arrays, i + 1);
+            return -1;
+        }
+        arrays[i].data = view->buf;
+    }
+    return 0;
+}
+
+static int agree(const Array *array, const char *name, Py_ssize_t a, Py_ssize_t b, Py_ssize_t c, Py_ssize_t d)
+{
+    const Py_ssize_t wanted[4] = {a, b, c, d};
+    for (int i = 0; i < array->view.ndim; i++)
+        if (array->view.shape[i] != wanted[i]) {
+            PyErr_Format(PyExc_ValueError, "%s: expected %zd along axis %d, got %zd", name, wanted[i], i, array->view.shape[i]);
+            return 0;
+        }
+    return 1;
+}
+
+static int few_states(Py_ssize_t n)
+{
+    if (n >= 1 && n <= MOST_STATES) return 1;
+    PyErr_Format(PyExc_ValueError, "expected 1 to %d states, got %zd", MOST_STATES, n);
+    return 0;
+}
+
+/* Calls BODY with n as a constant, so that loops over states unroll. */
+#define WITH_STATES(n, BODY)                                                                                                  \
+    switch (n) {                                                                                                              \
+    case 1: BODY(1); break;                                                                                                   \
+    case 2: BODY(2); break;                                                                                                   \
+    case 3: BODY(3); break;                                                                                                   \
+    case 4: BODY(4); break;                                                                                                   \
+    }
+
+/* Series side by side, in the registers of the processor where the compiler has a type for them. */
+#if defined(__GNUC__)
+#pragma GCC diagnostic ignored "-Wpsabi" /* vectors are passed between inlined functions only */
+typedef double Vector __attribute__((vector_size(32)));
+typedef double Anywhere __attribute__((vector_size(32), aligned(8), may_alias)); /* in memory */
+#define PARTS 2
+#define UNROLL _Pragma("GCC unroll 4")
+#if defined(__has_builtin)
+#if __has_builtin(__builtin_shufflevector)
+#define SHUFFLE __builtin_shufflevector
+#endif
+#endif
+#else
+typedef double Vector, Anywhere;
+#define PARTS 4
+#define UNROLL
+#endif
+typedef struct {
+    Vector part[PARTS];
+} Lane;
+#define WIDTH ((int)(sizeof(Lane) / sizeof(double)))
+
+typedef struct {
+    Py_ssize_t n_times, n_systems;
+    const double *a, *b, *drifts, *u, *c, *r, *m0, *v0, *observed;
+    double *means, *covariances, *innovations, *variances, *log_likelihoods, *gains;
+} Systems;
+
+/* What is filtered is the deviation from the path expected without observations:
+   d[t] = F[t-1] d[t-1] + g[t-1] y[t-1],  F = A - g c,  g = A K,    e[t] = y[t] - c d[t],  y = o - path */
+typedef struct {
+    Py_ssize_t n_series, n_times, n_dof, n_paths;
+    const double *closed, *feedback, *sensor, *precisions, *observed, *paths;
+} Series;
+
+/* ---- Loops, for any processor and for AVX2 ------------------------------------------------------------------------------ */
+
+/* Each of them has two names. */
+#define predict NAMED(predict)
+#define update NAMED(update)
+#define filter_system NAMED(filter_system)
+#define load NAMED(load)
+#define store NAMED(store)
+#define times NAMED(times)
+#define plus NAMED(plus)
+#define bring_together NAMED(bring_together)
+#define innovation_of NAMED(innovation_of)
+#define go_on NAMED(go_on)
+#define score_tile NAMED(score_tile)
+#define smooth_tile NAMED(smooth_tile)
+#define filter_all NAMED(filter_all)
+#define step_all NAMED(step_all)
+#define score_all NAMED(score_all)
+#define smooth_all NAMED(smooth_all)
+
+#define NAMED(name) name##_anywhere
+#include "_kernels.c"
+#undef NAMED
+
+#if defined(__GNUC__) && defined(__x86_64__) && !defined(__clang__)
+#pragma GCC push_options
+#pragma GCC target("arch=haswell")
+#define NAMED(name) name##_avx2
+#include "_kernels.c"
+#undef NAMED
+#pragma GCC pop_options
+#define CHOOSE(name) (has_avx2 ? name##_avx2 : name##_anywhere)
+static int has_avx2;
+static void look_at_processor(void) { has_avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"); }
+#else
+#define CHOOSE(name) name##_anywhere
+static void look_at_processor(void) {}
+#endif
+#undef filter_all
+#undef step_all
+#undef score_all
+#undef smooth_all
+
+/* ---- filter_systems ----------------------------------------------------------------------------------------------------- */
+
+static PyObject *filter_systems(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
+{
+    static const Spec specs[] = {
+        {"transition", 0, 3}, {"input_vector", 0, 2}, {"drifts", 0, 3}, {"input_variances", 0, 2},
+        {"sensor", 0, 2}, {"noise", 0, 1}, {"initial_mean", 0, 2}, {"initial_covariance", 0, 3},
+        {"observations", 0, 2}, {"means", 1, 3}, {"covariances", 1, 4}, {"innovations", 1, 2},
+        {"variances", 1, 2}, {"log_likelihoods", 1, 2}, {"gains", 1, 3},
+    };
+    enum { COUNT = sizeof(specs) / sizeof(specs[0]) };
+    Array x[COUNT];
+    if (take(arguments, given, specs, COUNT, x) < 0) return NULL;
+    const Py_ssize_t t = x[8].view.shape[0], m = x[8].view.shape[1], n = x[0].view.shape[1];
+    const Py_ssize_t wanted[COUNT][4] = {
+        {m, n, n, 0}, {m, n, 0, 0}, {t - 1, m, n, 0}, {t - 1, m, 0, 0}, {m, n, 0, 0}, {m, 0, 0, 0}, {m, n, 0, 0},
+        {m, n, n, 0}, {t, m, 0, 0}, {t, m, n, 0}, {t, m, n, n}, {t, m, 0, 0}, {t, m, 0, 0}, {t, m, 0, 0}, {t, m, n, 0},
+    };
+    int fits = few_states(n);
+    for (int i = 0; fits && i < COUNT; i++)
+        fits = agree(&x[i], specs[i].name, wanted[i][0], wanted[i][1], wanted[i][2], wanted[i][3]);
+    if (fits) {
+        Systems systems = {t, m, x[0].data, x[1].data, x[2].data, x[3].data, x[4].data, x[5].data, x[6].data, x[7].data,
+                           x[8].data, x[9].data, x[10].data, x[11].data, x[12].data, x[13].data, x[14].data};
+        Py_BEGIN_ALLOW_THREADS
+        CHOOSE(filter_all)((int)n, &systems);
+        Py_END_ALLOW_THREADS
+    }
+    release(x, COUNT);
+    if (!fits) return NULL;
+    Py_RETURN_NONE;
+}
+
+/* ---- filter_step -------------------------------------------------------------------------------------------------------- */
+
+static PyObject *filter_step(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
+{
+    static const Spec specs[] = {
+        {"system", 0, 2}, {"inputs", 0, 2}, {"observation", 0, 1}, {"before", 0, 2}, {"after", 1, 2},
+    };
+    enum { COUNT = sizeof(specs) / sizeof(specs[0]) };
+    Array x[COUNT];
+    if (take(arguments, given, specs, COUNT, x) < 0) return NULL;
+    const Py_ssize_t d = x[2].view.shape[0], n = x[1].view.shape[1] - 1;
+    double total = 0;
+    const int fits = few_states(n) && agree(&x[0], "system", d, n * n + 2 * n + 1, 0, 0) && agree(&x[1], "inputs", d, n + 1, 0, 0)
+                     && agree(&x[3], "before", d, n * n + n + 3, 0, 0) && agree(&x[4], "after", d, n * n + n + 3, 0, 0);
+    if (fits) total = CHOOSE(step_all)((int)n, d, x[0].data, x[1].data, x[2].data, x[3].data, x[4].data);
+    release(x, COUNT);
+    return fits ? PyFloat_FromDouble(total) : NULL;
+}
+
+/* ---- Series that share their gains -------------------------------------------------------------------------------------- */
+
+static int series_fit(const Array *x, Series *s, Py_ssize_t *n_states)
+{
+    const Py_ssize_t n = x[0].view.shape[2], t = x[4].view.shape[1], d = x[4].view.shape[2], count = x[4].view.shape[0];
+    const Py_ssize_t n_paths = x[5].view.shape[0];
+    *s = (Series){count, t, d, n_paths, x[0].data, x[1].data, x[2].data, x[3].data, x[4].data, x[5].data};
+    *n_states = n;
+    return few_states(n) && agree(&x[0], "closed_loop", t, d, n, n) && agree(&x[1], "feedback", t, d, n, 0)
+           && agree(&x[2], "sensor", d, n, 0, 0) && agree(&x[3], "precisions", t, d, 0, 0)
+           && agree(&x[5], "paths", n_paths == 1 ? 1 : count, t, d, 0);
+}
+
+#define SERIES {"closed_loop", 0, 4}, {"feedback", 0, 3}, {"sensor", 0, 2}, {"precisions", 0, 2}, {"observations", 0, 3}, \
+               {"paths", 0, 3}
+
+static PyObject *squared_innovations(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
+{
+    static const Spec specs[] = {SERIES, {"squares", 1, 2}};
+    enum { COUNT = sizeof(specs) / sizeof(specs[0]) };
+    Array x[COUNT];
+    Series s;
+    Py_ssize_t n;
+    if (take(arguments, given, specs, COUNT, x) < 0) return NULL;
+    int done = series_fit(x, &s, &n) && agree(&x[6], "squares", s.n_series, s.n_dof, 0, 0);
+    if (done) {
+        const Py_ssize_t longest = s.n_dof < TILE ? TILE / s.n_dof : 1;
+        double *work = malloc((longest * s.n_dof + s.n_dof * (n + 1)) * WIDTH * sizeof(double));
+        done = work != NULL;
+        if (done) {
+            Py_BEGIN_ALLOW_THREADS
+            CHOOSE(score_all)((int)n, &s, work, work + longest * s.n_dof * WIDTH, x[6].data);
+            Py_END_ALLOW_THREADS
+        } else
+            PyErr_NoMemory();
+        free(work);
+    }
+    release(x, COUNT);
+    if (!done) return NULL;
+    Py_RETURN_NONE;
+}
+
+static PyObject *smoothed_states(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
+{
+    static const Spec specs[] = {SERIES, {"predicted_covariances", 0, 4}, {"path_states", 0, 3}, {"smoothed", 1, 4}};
+    enum { COUNT = sizeof(specs) / sizeof(specs[0]) };
+    Array x[COUNT];
+    Series s;
+    Py_ssize_t n;
+    if (take(arguments, given, specs, COUNT, x) < 0) return NULL;
+    int done = series_fit(x, &s, &n);
+    done = done && agree(&x[6], "predicted_covariances", s.n_times, s.n_dof, n, n)
+           && agree(&x[7], "path_states", s.n_times, s.n_dof, n, 0) && agree(&x[8], "smoothed", s.n_series, s.n_times, s.n_dof, n);
+    if (done) {
+        double *work = malloc((s.n_dof + n + 1 + s.n_dof * n) * s.n_times * WIDTH * sizeof(double));
+        done = work != NULL;
+        if (done) {
+            Py_BEGIN_ALLOW_THREADS
+            CHOOSE(smooth_all)((int)n, &s, x[6].data, x[7].data, work, x[8].data);
+            Py_END_ALLOW_THREADS
+        } else
+            PyErr_NoMemory();
+        free(work);
+    }
+    release(x, COUNT);
+    if (!done) return NULL;
+    Py_RETURN_NONE;
+}
+
+/* ---- The module --------------------------------------------------------------------------------------------------------- */
+
+#define FUNCTION(name) {#name, (PyCFunction)(void (*)(void))name, METH_FASTCALL, NULL}
+
+static PyMethodDef functions[] = {
+    FUNCTION(filter_systems), FUNCTION(filter_step), FUNCTION(squared_innovations), FUNCTION(smoothed_states),
+    {NULL, NULL, 0, NULL},
+};
+
+static PyModuleDef_Slot slots[] = {{0, NULL}};
+
+static struct PyModuleDef definition = {
+    PyModuleDef_HEAD_INIT, "_kernels", "The loops of probdmp.gaussian, compiled; see _kernels_numpy.py.", 0, functions, slots,
+    NULL, NULL, NULL,
+};
+
+PyMODINIT_FUNC PyInit__kernels(void)
+{
+    look_at_processor();
+    return PyModuleDef_Init(&definition);
+}
+
+#else /* NAMED: the loops */
+
+/* ---- One step of one system --------------------------------------------------------------------------------------------- */
+
+/* m- = A m + drift,  V- = A V A^T + u b b^T, in place. */
+INLINE void predict(int n, const double *a, const double *b, const double *drift, double u, double *m, double *v)
+{
+    double product[MOST_STATES * MOST_STATES], mean[MOST_STATES];
+    for (int i = 0; i < n; i++) {
+        mean[i] = drift[i];
+        for (int k = 0; k < n; k++) mean[i] += a[i * n + k] * m[k];
+        for (int j = 0; j < n; j++) {
+            double sum = 0;
+            for (int k = 0; k < n; k++) sum += a[i * n + k] * v[k * n + j];
+            product[i * n + j] = sum;
+        }
+    }
+    for (int i = 0; i < n; i++) {
+        m[i] = mean[i];
+        for (int j = 0; j <= i; j++) {
+            double sum = u * b[i] * b[j];
+            for (int k = 0; k < n; k++) sum += product[i * n + k] * a[j * n + k];
+            v[i * n + j] = v[j * n + i] = sum;
+        }
+    }
+}
+
+/* Takes in an observation, in place; V in Joseph form. Gives the log-likelihood; 0 if there was none. */
+INLINE double update(int n, const double *c, double r, double observation, double *m, double *v, double *gain,
+                     double *innovation, double *variance)
+{
+    double spread[MOST_STATES], s = r, e = observation;
+    for (int i = 0; i < n; i++) {
+        spread[i] = 0;
+        for (int k = 0; k < n; k++) spread[i] += v[i * n + k] * c[k];
+        e -= c[i] * m[i];
+    }
+    for (int i = 0; i < n; i++) s += c[i] * spread[i];
+    *innovation = e;
+    *variance = s;
+    if (isnan(e)) {
+        for (int i = 0; i < n; i++) gain[i] = 0;
+        return 0;
+    }
+    double kept[MOST_STATES * MOST_STATES], product[MOST_STATES * MOST_STATES];
+    for (int i = 0; i < n; i++) {
+        gain[i] = spread[i] / s;
+        m[i] += gain[i] * e;
+    }
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < n; j++) kept[i * n + j] = (i == j) - gain[i] * c[j];
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < n; j++) {
+            double sum = 0;
+            for (int k = 0; k < n; k++) sum += kept[i * n + k] * v[k * n + j];
+            product[i * n + j] = sum;
+        }
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j <= i; j++) {
+            double sum = r * gain[i] * gain[j];
+            for (int k = 0; k < n; k++) sum += product[i * n + k] * kept[j * n + k];
+            v[i * n + j] = v[j * n + i] = sum;
+        }
+    return -0.5 * (e * e / s + log(s) + LOG_2PI);
+}
+
+INLINE void filter_system(int n, const Systems *s, Py_ssize_t i)
+{
+    double m[MOST_STATES], v[MOST_STATES * MOST_STATES];
+    const Py_ssize_t count = s->n_systems;
+    const double *a = s->a + i * n * n, *b = s->b + i * n, *c = s->c + i * n;
+    memcpy(m, s->m0 + i * n, n * sizeof(double));
+    memcpy(v, s->v0 + i * n * n, n * n * sizeof(double));
+    for (Py_ssize_t t = 0; t < s->n_times; t++) {
+        const Py_ssize_t here = t * count + i;
+        if (t > 0) predict(n, a, b, s->drifts + (here - count) * n, s->u[here - count], m, v);
+        s->log_likelihoods[here] = update(n, c, s->r[i], s->observed[here], m, v, s->gains + here * n, s->innovations + here,
+                                          s->variances + here);
+        memcpy(s->means + here * n, m, n * sizeof(double));
+        memcpy(s->covariances + here * n * n, v, n * n * sizeof(double));
+    }
+}
+
+static void filter_all(int n, const Systems *systems)
+{
+#define BODY(k) for (Py_ssize_t i = 0; i < systems->n_systems; i++) filter_system(k, systems, i)
+    WITH_STATES(n, BODY)
+#undef BODY
+}
+
+/* A row of `system` holds A, b, c, r of one degree of freedom; of `inputs` its drift and u; of a record its state, m and V, as
+   predicted for a tick, and what was found when that tick was observed: e, S, log-likelihood of the tick BEFORE. */
+static double step_all(int n, Py_ssize_t n_dof, const double *system, const double *inputs, const double *observed,
+                            const double *before, double *after)
+{
+    const int row = n * n + 2 * n + 1, state = n + n * n, record = state + 3;
+    double total = 0;
+#define BODY(k)                                                                                                               \
+    for (Py_ssize_t d = 0; d < n_dof; d++) {                                                                                  \
+        const double *own = system + d * row, *said = inputs + d * (n + 1);                                                   \
+        double *next = after + d * record, gain[MOST_STATES];                                                                 \
+        memcpy(next, before + d * record, state * sizeof(double));                                                            \
+        next[state + 2] = update(k, own + n * n + n, own[row - 1], observed[d], next, next + n, gain, next + state,           \
+                                 next + state + 1);                                                                           \
+        total += next[state + 2];                                                                                             \
+        predict(k, own, own + n * n, said, said[n], next, next + n);                                                          \
+    }
+    WITH_STATES(n, BODY)
+#undef BODY
+    return total;
+}
+
+/* ---- Series that share their gains -------------------------------------------------------------------------------------- */
+
+INLINE Lane load(const double *from)
+{
+    Lane x;
+    UNROLL for (int i = 0; i < PARTS; i++) x.part[i] = ((const Anywhere *)from)[i];
+    return x;
+}
+
+INLINE void store(double *to, Lane x)
+{
+    UNROLL for (int i = 0; i < PARTS; i++) ((Anywhere *)to)[i] = x.part[i];
+}
+
+INLINE Lane times(double factor, Lane x)
+{
+    UNROLL for (int i = 0; i < PARTS; i++) x.part[i] = factor * x.part[i];
+    return x;
+}
+
+/* sum + factor x */
+INLINE Lane plus(Lane sum, double factor, Lane x)
+{
+    UNROLL for (int i = 0; i < PARTS; i++) sum.part[i] += factor * x.part[i];
+    return sum;
+}
+
+/* Observations less their path, `steps` times of WIDTH series from `first` on, side by side: tile[(t, d)][series]. */
+INLINE void bring_together(const Series *s, Py_ssize_t first, Py_ssize_t start, Py_ssize_t steps, double *tile)
+{
+    const Py_ssize_t size = s->n_times * s->n_dof, offset = start * s->n_dof, length = steps * s->n_dof;
+    const double *o[WIDTH], *path[WIDTH];
+    for (int w = 0; w < WIDTH; w++) {
+        const Py_ssize_t series = first + w < s->n_series ? first + w : s->n_series - 1;
+        o[w] = s->observed + series * size + offset;
+        path[w] = s->paths + (s->n_paths > 1 ? series : 0) * size + offset;
+    }
+    Py_ssize_t i = 0;
+#ifdef SHUFFLE
+    for (; i + 4 <= length; i += 4)
+        for (int part = 0; part < PARTS; part++) {
+            Vector x[4];
+            UNROLL for (int w = 0; w < 4; w++)
+                x[w] = *(const Anywhere *)(o[4 * part + w] + i) - *(const Anywhere *)(path[4 * part + w] + i);
+            const Vector a = SHUFFLE(x[0], x[1], 0, 4, 2, 6), b = SHUFFLE(x[0], x[1], 1, 5, 3, 7);
+            const Vector c = SHUFFLE(x[2], x[3], 0, 4, 2, 6), d = SHUFFLE(x[2], x[3], 1, 5, 3, 7);
+            double *to = tile + i * WIDTH + 4 * part;
+            *(Anywhere *)to = SHUFFLE(a, c, 0, 1, 4, 5);
+            *(Anywhere *)(to + WIDTH) = SHUFFLE(b, d, 0, 1, 4, 5);
+            *(Anywhere *)(to + 2 * WIDTH) = SHUFFLE(a, c, 2, 3, 6, 7);
+            *(Anywhere *)(to + 3 * WIDTH) = SHUFFLE(b, d, 2, 3, 6, 7);
+        }
+#endif
+    for (; i < length; i++)
+        for (int w = 0; w < WIDTH; w++) tile[i * WIDTH + w] = o[w][i] - path[w][i];
+}
+
+INLINE Lane innovation_of(int n, const double *c, Lane y, const Lane *d)
+{
+    UNROLL for (int i = 0; i < n; i++) y = plus(y, -c[i], d[i]);
+    return y;
+}
+
+INLINE void go_on(int n, const double *closed, const double *feedback, Lane y, Lane *d)
+{
+    Lane next[MOST_STATES];
+    UNROLL for (int i = 0; i < n; i++) {
+        next[i] = times(feedback[i], y);
+        UNROLL for (int k = 0; k < n; k++) next[i] = plus(next[i], closed[i * n + k], d[k]);
+    }
+    UNROLL for (int i = 0; i < n; i++) d[i] = next[i];
+}
+
+INLINE void score_tile(int n, const Series *s, Py_ssize_t dof, Py_ssize_t start, Py_ssize_t steps, const double *tile,
+                       double *state, double *sums)
+{
+    Lane d[MOST_STATES], sum = load(sums);
+    UNROLL for (int i = 0; i < n; i++) d[i] = load(state + i * WIDTH);
+    for (Py_ssize_t t = 0; t < steps; t++) {
+        const Py_ssize_t here = (start + t) * s->n_dof + dof;
+        const Lane y = load(tile + (t * s->n_dof + dof) * WIDTH), e = innovation_of(n, s->sensor + dof * n, y, d);
+        const Lane weighted = times(s->precisions[here], e);
+        UNROLL for (int i = 0; i < PARTS; i++) sum.part[i] += weighted.part[i] * e.part[i];
+        go_on(n, s->closed + here * n * n, s->feedback + here * n, y, d);
+    }
+    UNROLL for (int i = 0; i < n; i++) store(state + i * WIDTH, d[i]);
+    store(sums, sum);
+}
+
+/* Sums of e^2 / S over time, (N, D); NaN where an observation is missing. */
+static void score_all(int n, const Series *s, double *tile, double *state, double *squares)
+{
+    const Py_ssize_t d = s->n_dof, longest = d < TILE ? TILE / d : 1;
+    double *sums = state + d * n * WIDTH;
+    for (Py_ssize_t first = 0; first < s->n_series; first += WIDTH) {
+        memset(state, 0, d * (n + 1) * WIDTH * sizeof(double));
+        for (Py_ssize_t start = 0; start < s->n_times; start += longest) {
+            const Py_ssize_t steps = s->n_times - start < longest ? s->n_times - start : longest;
+            bring_together(s, first, start, steps, tile);
+            for (Py_ssize_t dof = 0; dof < d; dof++) {
+#define BODY(k) score_tile(k, s, dof, start, steps, tile, state + dof * n * WIDTH, sums + dof * WIDTH)
+                WITH_STATES(n, BODY)
+#undef BODY
+            }
+        }
+        for (int w = 0; w < WIDTH && first + w < s->n_series; w++)
+            for (Py_ssize_t dof = 0; dof < d; dof++) squares[(first + w) * d + dof] = sums[dof * WIDTH + w];
+    }
+}
+
+/* Smoothed states of one degree of freedom of WIDTH series:
+   rho[t] = c e / S + F[t]^T rho[t+1],  smoothed = path + d[t] + P[t] rho[t] */
+INLINE void smooth_tile(int n, const Series *s, const double *predicted, const double *states, Py_ssize_t dof,
+                        const double *tile, double *work, double *together)
+{
+    Lane d[MOST_STATES], rho[MOST_STATES], back[MOST_STATES];
+    const double *c = s->sensor + dof * n;
+    const Py_ssize_t stride = (n + 1) * WIDTH;
+    UNROLL for (int i = 0; i < n; i++) d[i] = rho[i] = times(0.0, load(tile));
+    for (Py_ssize_t t = 0; t < s->n_times; t++) {
+        const Py_ssize_t here = t * s->n_dof + dof;
+        const Lane y = load(tile + here * WIDTH);
+        UNROLL for (int i = 0; i < n; i++) store(work + t * stride + i * WIDTH, d[i]);
+        store(work + t * stride + n * WIDTH, innovation_of(n, c, y, d));
+        go_on(n, s->closed + here * n * n, s->feedback + here * n, y, d);
+    }
+    for (Py_ssize_t t = s->n_times - 1; t >= 0; t--) {
+        const Py_ssize_t here = t * s->n_dof + dof;
+        const double *before = work + t * stride, *closed = s->closed + here * n * n;
+        const Lane weighted = times(s->precisions[here], load(before + n * WIDTH));
+        UNROLL for (int i = 0; i < n; i++) {
+            back[i] = times(c[i], weighted);
+            UNROLL for (int k = 0; k < n; k++) back[i] = plus(back[i], closed[k * n + i], rho[k]);
+        }
+        UNROLL for (int i = 0; i < n; i++) rho[i] = back[i];
+        UNROLL for (int i = 0; i < n; i++) {
+            Lane value = load(before + i * WIDTH);
+            UNROLL for (int k = 0; k < n; k++) value = plus(value, predicted[(here * n + i) * n + k], rho[k]);
+            UNROLL for (int k = 0; k < PARTS; k++) value.part[k] += states[here * n + i];
+            store(together + (here * n + i) * WIDTH, value);
+        }
+    }
+}
+
+static void smooth_all(int n, const Series *s, const double *predicted, const double *states, double *work,
+                              double *smoothed)
+{
+    const Py_ssize_t size = s->n_times * s->n_dof * n;
+    double *tile = work + s->n_times * (n + 1) * WIDTH, *together = tile + s->n_times * s->n_dof * WIDTH;
+    for (Py_ssize_t first = 0; first < s->n_series; first += WIDTH) {
+        bring_together(s, first, 0, s->n_times, tile);
+        for (Py_ssize_t dof = 0; dof < s->n_dof; dof++) {
+#define BODY(k) smooth_tile(k, s, predicted, states, dof, tile, work, together)
+            WITH_STATES(n, BODY)
+#undef BODY
+        }
+        for (int w = 0; w < WIDTH && first + w < s->n_series; w++) {
+            double *own = smoothed + (first + w) * size;
+            for (Py_ssize_t i = 0; i < size; i++) own[i] = together[i * WIDTH + w];
+        }
+    }
+}
+
+#endif

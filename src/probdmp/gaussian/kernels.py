@@ -1,0 +1,49 @@
+"""The compiled kernels, or where there are none their NumPy twins: the only module that knows that there are two.
+
+The extension is built when the package is installed and a compiler is found. `PROBDMP_NO_EXTENSION=1` in the environment
+chooses the twins all the same.
+"""
+
+import os
+from collections.abc import Callable
+from itertools import pairwise
+from types import ModuleType
+
+from probdmp.gaussian import _kernels_numpy
+
+__all__ = ["COMPILED", "MOST_STATES", "filter_step", "filter_systems", "in_threads", "smoothed_states", "squared_innovations"]
+
+
+def _chosen() -> ModuleType:
+    if os.environ.get("PROBDMP_NO_EXTENSION", "0") not in ("", "0"):
+        return _kernels_numpy
+    try:
+        from probdmp.gaussian import _kernels  # type: ignore[attr-defined]
+    except ImportError:  # it could not be built
+        return _kernels_numpy
+    return _kernels
+
+
+_kernels = _chosen()
+COMPILED = _kernels is not _kernels_numpy
+"""Whether the compiled kernels are in use."""
+MOST_STATES = 4
+"""States of a system that the kernels can filter."""
+
+filter_systems: Callable[..., None] = _kernels.filter_systems
+filter_step: Callable[..., float] = _kernels.filter_step
+squared_innovations: Callable[..., None] = _kernels.squared_innovations
+smoothed_states: Callable[..., None] = _kernels.smoothed_states
+
+
+def in_threads(work: Callable[[slice], None], n_series: int, n_threads: int) -> None:
+    """Split series among threads; the compiled kernels let them run at the same time."""
+    if n_threads == 1:
+        work(slice(0, n_series))
+        return
+    from concurrent.futures import ThreadPoolExecutor
+
+    bounds = [n_series * i // n_threads for i in range(n_threads + 1)]
+    parts = [slice(first, last) for first, last in pairwise(bounds) if last > first]
+    with ThreadPoolExecutor(max(len(parts), 1)) as pool:
+        list(pool.map(work, parts))
