@@ -6,6 +6,7 @@ Code behind the boundary assumes what was checked here and checks nothing again.
 import math
 import sys
 from collections.abc import Collection, Sequence
+from typing import TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,6 +31,7 @@ __all__ = [
     "check_seconds",
     "freeze_arrays",
     "frozen",
+    "is_plain",
     "shape_text",
 ]
 
@@ -105,6 +107,11 @@ def check_array(
             f"{name} of magnitude at most {LARGEST_MAGNITUDE:g}", f"{largest:g}", "Rescale to usual units, such as metres."
         )
     return array
+
+
+def is_plain(array: object) -> TypeGuard[FloatArray]:
+    """Whether kernels take it as it is; they look at its values themselves, which takes long for many, and for few."""
+    return isinstance(array, np.ndarray) and array.dtype == np.float64 and array.flags.c_contiguous
 
 
 def freeze_arrays(value: object) -> None:

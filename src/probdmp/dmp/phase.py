@@ -12,7 +12,7 @@ import numpy as np
 
 from probdmp.checks import FloatArray
 
-__all__ = ["ALPHA_X", "phases_at"]
+__all__ = ["ALPHA_X", "phase_at", "phases_at"]
 
 ALPHA_X = math.log(100)
 """Decay rate of the phase per movement: x = 0.01 at the end."""
@@ -31,3 +31,8 @@ def phases_at(times: FloatArray, duration: FloatArray | float) -> FloatArray:
     Array of phases, dimensionless.
     """
     return np.exp(-ALPHA_X * times / duration)
+
+
+def phase_at(time: float, duration: float) -> float:
+    """The same of one time, fast enough for a control loop."""
+    return math.exp(-ALPHA_X * time / duration)

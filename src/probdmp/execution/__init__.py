@@ -1,8 +1,9 @@
 """Running a primitive: rollout, tracking, smoothing and sampling of recordings, online execution."""
 
 from probdmp.execution.execution_batch import ExecutionBatch, score_batch
+from probdmp.execution.execution_step import ExecutionStep, Judgement
 from probdmp.execution.feedback_gains import feedback_gains
-from probdmp.execution.online import ExecutionStep, Judgement, Monitor, Observed, OnlineExecution
+from probdmp.execution.online import Monitor, Observed, OnlineExecution
 from probdmp.execution.plain_sensors import sensors_as_plain, sensors_from_plain
 from probdmp.execution.planar_arm import PlanarArm, planar_arm_sensor
 from probdmp.execution.readings import readings_of, recording_of_readings

@@ -19,7 +19,7 @@ from probdmp.dmp import Primitive, Task, step_count
 from probdmp.errors import InputError
 from probdmp.execution.sensor_array import SensorArray
 from probdmp.execution.sensors import NonlinearSensor
-from probdmp.execution.step_filters import STEP_FILTERS, StepFilter
+from probdmp.execution.step_filters import StepFilter, step_filter
 
 __all__ = ["feedback_gains"]
 
@@ -47,24 +47,21 @@ def feedback_gains(primitive: Primitive, task: Task, dt: float, array: SensorArr
         hint = "Linearise it where you want to know the gain, or compare the commands of two executions."
         raise InputError("linear sensors without gates, for a gain that does not depend on readings", _adaptive(sensors), hint)
     n_steps = step_count(float(task.duration), dt)
-    filtering = STEP_FILTERS[primitive.configuration.weight_uncertainty](primitive, task, dt, n_steps, sensors)
+    filtering = step_filter(primitive, task, dt, n_steps, sensors)
     return np.stack([_gain_of_tick(filtering, sensors, primitive.n_dof) for _ in range(n_steps - 1)])
 
 
 def _gain_of_tick(filtering: StepFilter, array: SensorArray, n_dof: int) -> FloatArray:
     """A K of this tick, (D, 3, O) array; the filter goes on to the next, as if each reading was as expected."""
-    # Filters replace what they hold, they do not write into it: a copy goes its own way.
-    looked = copy(filtering).update(np.zeros(len(array.outputs)))
-    expected, scales = -looked.innovations, np.sqrt(np.diagonal(looked.innovation_covariance))
+    looked = copy(filtering).step(np.zeros(len(array.outputs)))
+    expected, scales = -looked.innovations, np.sqrt(looked.innovation_variances)
     probes = {output: copy(filtering) for output in np.flatnonzero(~array.silent).tolist()}
-    filtering.update(expected)
-    undisturbed = filtering.predict()[0][:n_dof]
+    undisturbed = filtering.step(expected).mean[:n_dof]
     gain = np.zeros((*undisturbed.shape, len(array.outputs)))
     for output, probe in probes.items():
         disturbed = expected.copy()
         disturbed[output] += scales[output]
-        probe.update(disturbed)
-        gain[..., output] = (probe.predict()[0][:n_dof] - undisturbed) / scales[output]
+        gain[..., output] = (probe.step(disturbed).mean[:n_dof] - undisturbed) / scales[output]
     return gain
 
 

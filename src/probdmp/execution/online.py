@@ -4,24 +4,26 @@ One `step` takes what the sensors say now and returns the state to be reached at
 update and the prediction, so the innovation e reaches the command as A K e: the feedback term is not added, it follows.
 """
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from copy import copy
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from probdmp.checks import BoolArray, FloatArray, check_choice, check_number, check_seconds, freeze_arrays
+from probdmp.checks import FloatArray, check_choice, check_number, check_seconds, is_plain
 from probdmp.dmp import Primitive, Task, step_count
-from probdmp.dmp.phase import phases_at
-from probdmp.dmp.transformation_system import ACCELERATION, POSITION, VELOCITY
+from probdmp.dmp.phase import phase_at
+from probdmp.dmp.transformation_system import POSITION
+from probdmp.execution.execution_step import ExecutionStep, Judgement
 from probdmp.execution.readings import observation_of
+from probdmp.execution.sensed_ticks import SensedTick
 from probdmp.execution.sensor_array import SensorArray
-from probdmp.execution.sensor_reports import SensorCounts, SensorTrack, sensor_tracks
-from probdmp.execution.step_filters import STEP_FILTERS, StepFilter
-from probdmp.execution.trajectory import GaussianChannel, channels_of
+from probdmp.execution.sensor_reports import SensorCounts
+from probdmp.execution.step_filters import step_filter
 
-__all__ = ["ExecutionStep", "Judgement", "Monitor", "Observed", "OnlineExecution"]
+__all__ = ["Monitor", "Observed", "OnlineExecution"]
 
 ALARM_REACTIONS = ("continue", "hold")
 MOST_LATE = 10
@@ -47,21 +49,6 @@ class Observed(NamedTuple):
     """(O,) array, units of the outputs squared: variance of the innovations, seen or not."""
 
 
-class Judgement(Protocol):
-    """What every verdict says."""
-
-    @property
-    def failed(self) -> bool: ...
-    @property
-    def time(self) -> float: ...
-    @property
-    def phase(self) -> float: ...
-    @property
-    def test_ratio(self) -> float: ...
-    @property
-    def contributions(self) -> FloatArray: ...
-
-
 class Monitor(Protocol):
     """Judges an execution while it runs; `probdmp.detection` makes them."""
 
@@ -77,50 +64,6 @@ class Detector(Protocol):
     """Makes a monitor for a primitive and the outputs of the sensors that observe it."""
 
     def monitor(self, primitive: Primitive, task: Task, dt: float, outputs: tuple[str, ...]) -> Monitor: ...
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ExecutionStep:
-    """What the controller is to reach at the next tick, and what this tick has shown."""
-
-    time: float
-    """Seconds since the start at which the desired state is due."""
-    position: FloatArray
-    """(D,) array, data units."""
-    velocity: FloatArray
-    """(D,) array, data units per second."""
-    acceleration: FloatArray
-    """(D,) array, data units per second squared."""
-    covariance: FloatArray
-    """(D, 3, 3) array over acceleration, velocity, position."""
-    phase: float
-    """x of the observation."""
-    log_likelihood: float
-    """Nats: density of the observation given the past; 0 without one."""
-    contributions: FloatArray
-    """(O,) array, nats: the share of each output of the sensors in the log-likelihood."""
-    innovations: FloatArray
-    """(O,) array, units of the outputs: measured minus predicted; NaN where not seen."""
-    test_ratio: float
-    """Statistic over threshold of the detector, above 1 for an alarm; NaN without a detector."""
-    verdict: Judgement | None
-    """What the detector says so far; None without a detector."""
-    channels: Mapping[str, GaussianChannel]
-    """What the learned channels should read at the next tick, by name, of one time each."""
-    innovation_covariance: FloatArray
-    """(O, O) array, units of the outputs multiplied: covariance of the innovations, seen or not."""
-    fused: BoolArray
-    """(O,) array: what was seen and believed."""
-    array: SensorArray
-    """The sensors."""
-
-    def __post_init__(self) -> None:
-        freeze_arrays(self)  # they are views of the filter's own
-
-    @property
-    def sensors(self) -> dict[str, SensorTrack]:
-        """By name of each sensor: its innovation at this tick, how surprising it was, whether it was rejected."""
-        return sensor_tracks(self.array, self.innovations[None], self.innovation_covariance[None], self.fused[None])
 
 
 class OnlineExecution:
@@ -158,26 +101,38 @@ class OnlineExecution:
         self.primitive, self.task, self.dt = primitive, task, check_seconds(dt, "dt")
         self.array = SensorArray(primitive) if sensors is None else sensors
         self._modulating = None if feedback is None else self.array.chosen(feedback)
+        if self._modulating is not None and self._modulating.all():
+            self._modulating = None
         self._detector = detector
         self._on_alarm = check_choice(on_alarm, "on_alarm", ALARM_REACTIONS)
-        self._chunk = step_count(float(task.duration), self.dt) + 1
+        self._duration, self._n_outputs = float(task.duration), len(self.array.outputs)
+        self._chunk = step_count(self._duration, self.dt) + 1
+        self._fresh = step_filter(primitive, task, self.dt, self._chunk, self.array)
         self.reset()
 
     def reset(self) -> None:
         """Back to the start, alarm cleared."""
-        make = STEP_FILTERS[self.primitive.configuration.weight_uncertainty]
-        self._filter: StepFilter = make(self.primitive, self.task, self.dt, self._chunk, self.array)
-        self._commanding = self._filter
-        if self._modulating is not None and not self._modulating.all():
-            self._commanding = make(self.primitive, self.task, self.dt, self._chunk, self.array)
+        self._filter = copy(self._fresh)
+        self._commanding = self._filter if self._modulating is None else copy(self._fresh)
         self._monitor: Monitor | None = None
         if self._detector is not None:
             self._monitor = self._detector.monitor(self.primitive, self.task, self.dt, self.array.outputs)
+        # What nobody else keeps or writes to, and the kernel looks at itself, is taken as it is.
+        self._takes_arrays = self._fresh.takes_any_values and self._monitor is None
         self._step, self._clock_offset, self.n_dropped, self._n_late = 0, 0.0, 0, 0
-        self.sensor_counts = {name: SensorCounts() for name in self.array.names}
-        """By name of each sensor: how many of its readings were used, rejected or missing so far."""
+        self._counts = {name: SensorCounts() for name in self.array.names}
+        self._n_complete = 0
         self._held: FloatArray | None = None
         self._last: ExecutionStep | None = None
+
+    @property
+    def sensor_counts(self) -> dict[str, SensorCounts]:
+        """By name of each sensor: how many of its readings were used, rejected or missing so far."""
+        if self._n_complete:
+            for counts in self._counts.values():
+                counts.add_fused(self._n_complete)
+            self._n_complete = 0
+        return self._counts
 
     @property
     def failed(self) -> bool:
@@ -203,7 +158,10 @@ class OnlineExecution:
             outputs. NaN: not measured; None: nothing was.
         time : seconds since the start at which it was measured; the next tick unless given.
         """
-        measured = observation_of(self.array, observation)
+        if self._takes_arrays and is_plain(observation) and observation.shape == (self._n_outputs,):
+            measured = observation
+        else:
+            measured = observation_of(self.array, observation)
         if time is not None:
             due = self._tick_of(check_number(time, "time as a number of seconds"))
             if due < self._step and self._last is not None:
@@ -227,45 +185,37 @@ class OnlineExecution:
 
     def _advance(self, measured: FloatArray) -> ExecutionStep:
         """One tick: update with what is measured (Alg. 2, lines 5-8), predict the next state (lines 3-4)."""
-        t = self._step
-        seen = self._filter.update(measured)
-        time = t * self.dt
-        phase = float(phases_at(np.asarray(time), self.task.duration))
-        variances = np.diagonal(seen.innovation_covariance)
-        signals = self.array.signals(measured)
-        observed = Observed(t, time, phase, signals, seen.contributions, seen.innovations, variances)
-        test_ratio = self._monitor.update(observed) if self._monitor is not None else np.nan
-        for name, part in self.array.slices.items():
-            self.sensor_counts[name].add(seen.innovations[part], seen.fused[part])
-        mean, covariance = self._filter.predict()
-        if self._modulating is not None and self._commanding is not self._filter:
-            self._commanding.update(np.where(self._modulating, measured, np.nan))
-            mean, covariance = self._commanding.predict()
+        time = self._step * self.dt
+        phase = phase_at(time, self._duration)
+        seen = commanded = self._filter.step(measured)
+        if seen.n_fused == self._n_outputs:
+            self._n_complete += 1
+        else:
+            self._count(seen)
+        test_ratio, verdict = math.nan, None
+        if self._monitor is not None:
+            test_ratio = self._monitor.update(self._observed(time, phase, measured, seen))
+            verdict = self._monitor.verdict
+        if self._modulating is not None:
+            commanded = self._commanding.step(np.where(self._modulating, measured, np.nan))
+        held = None
+        if self._on_alarm == "hold" and verdict is not None and verdict.failed:
+            held = self._hold(commanded)
         self._step += 1
-        d = self.primitive.n_dof
-        desired = self._desired(mean[:d])
-        return ExecutionStep(
-            time=self._step * self.dt,
-            position=desired[:, POSITION],
-            velocity=desired[:, VELOCITY],
-            acceleration=desired[:, ACCELERATION],
-            covariance=covariance[:d],
-            phase=phase,
-            log_likelihood=float(seen.contributions.sum()),
-            contributions=seen.contributions,
-            innovations=seen.innovations,
-            test_ratio=test_ratio,
-            verdict=self.verdict,
-            channels=channels_of(self.primitive, mean[None], covariance[None]),
-            innovation_covariance=seen.innovation_covariance,
-            fused=seen.fused,
-            array=self.array,
-        )
+        due = self._step * self.dt
+        return ExecutionStep(due, phase, test_ratio, verdict, seen, commanded, held, self.primitive, self.array)
 
-    def _desired(self, mean: FloatArray) -> FloatArray:
-        """(D, 3) array: the predicted state, or rest at the position due at the alarm."""
-        if self._on_alarm == "continue" or not self.failed:
-            return mean
+    def _observed(self, time: float, phase: float, measured: FloatArray, seen: SensedTick) -> Observed:
+        signals = self.array.signals(measured)
+        return Observed(self._step, time, phase, signals, seen.contributions, seen.innovations, seen.innovation_variances)
+
+    def _count(self, seen: SensedTick) -> None:
+        innovations, fused, counts = seen.innovations, seen.fused, self.sensor_counts
+        for name, part in self.array.slices.items():
+            counts[name].add(innovations[part], fused[part])
+
+    def _hold(self, commanded: SensedTick) -> FloatArray:
+        """(D, 3) array: rest at the position due at the alarm."""
         if self._held is None:
-            self._held = mean * np.eye(3)[POSITION]
+            self._held = commanded.mean[: self.primitive.n_dof] * np.eye(3)[POSITION]
         return self._held

@@ -73,11 +73,15 @@ class SensorCounts:
     n_rejected_in_a_row: int = 0
     """Rejected since one was used: a sensor that has been wrong for long, or a filter that is."""
 
+    def add_fused(self, count: int) -> None:
+        """Count readings that were used."""
+        self.n_fused += count
+        self.n_rejected_in_a_row = 0
+
     def add(self, innovations: FloatArray, fused: BoolArray) -> None:
         """Count one tick, (O,) arrays; innovations are NaN where nothing was seen."""
         if fused.any():
-            self.n_fused += 1
-            self.n_rejected_in_a_row = 0
+            self.add_fused(1)
         elif np.isnan(innovations).all():
             self.n_missing += 1
         else:

@@ -1,99 +1,141 @@
-"""The two ways to filter an execution tick by tick: forcing terms redrawn at every step, or parameters that stay."""
+"""The ways to filter an execution tick by tick: forcing terms redrawn at every step, or parameters that stay."""
 
-from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 
-from probdmp.checks import BoolArray, FloatArray
+from probdmp.checks import FloatArray, check_array
 from probdmp.dmp import Primitive, Task, linear_gaussian_model, stack_tasks
 from probdmp.dmp.joint_model import joint_executions, state_rows
 from probdmp.dmp.responses import continue_responses, parameter_responses
 from probdmp.execution.independent_filtering import look_through, of_each_dof, sensed_system
 from probdmp.execution.joint_filtering import start_deviation, state_moments, update_joint
+from probdmp.execution.sensed_ticks import RECORD_SIZE, RecordedTick, SensedTick, Tick
 from probdmp.execution.sensor_array import SensorArray
-from probdmp.gaussian import block_diagonal, output_shares, predict, predict_deviation, update
+from probdmp.gaussian import block_diagonal, kernels, output_shares, predict, predict_deviation, update
+from probdmp.gaussian.scalar_systems import scalar_systems
 
-__all__ = ["STEP_FILTERS", "Sensed", "StepFilter"]
+__all__ = ["StepFilter", "step_filter"]
 
-
-class Sensed(NamedTuple):
-    """What the sensors said at one tick."""
-
-    contributions: FloatArray
-    """(O,) array, nats."""
-    innovations: FloatArray
-    """(O,) array, units of the outputs; NaN where not seen."""
-    innovation_covariance: FloatArray
-    """(O, O) array, whether seen or not."""
-    fused: BoolArray
-    """(O,) array: what was seen and believed."""
+LATER_CHUNK = 64
+"""Ticks that are prepared at a time once the movement is over."""
 
 
 class StepFilter(Protocol):
-    """A filter that is updated and predicts in turn, beginning with an update of the initial state."""
+    """A filter that takes in one observation after the other, the first of the initial state.
 
-    def update(self, observation: FloatArray) -> Sensed:
-        """Take in an observation, (O,) array, NaN where nothing was measured."""
+    It replaces what it holds and does not write into it: a copy goes its own way.
+    """
+
+    takes_any_values: bool
+    """Whether it refuses by itself what is infinite; to others only checked observations are given."""
+
+    def step(self, observation: FloatArray) -> SensedTick:
+        """Take in an observation, (O,) array, NaN where nothing was measured, and go on to the next tick."""
         ...
 
-    def predict(self) -> tuple[FloatArray, FloatArray]:
-        """Go on to the next tick: mean (S, 3) and covariance (S, 3, 3) of its state."""
-        ...
 
-
-class IndependentFilter:
-    """The paper's Kalman filter.
+def step_filter(primitive: Primitive, task: Task, dt: float, chunk: int, array: SensorArray) -> StepFilter:
+    """The filter that a primitive asks for.
 
     Parameters
     ----------
-    chunk : for how many ticks inputs are prepared at a time; the movement need not end after its duration.
+    chunk : for how many ticks it is prepared; the movement need not end then.
     """
+    if primitive.configuration.weight_uncertainty == "joint":
+        return JointFilter(primitive, task, dt, chunk, array)
+    if array.is_plain and not array.is_coupled and not array.is_adaptive and not array.silent.any():
+        return PlainFilter(primitive, task, dt, chunk, array)
+    return IndependentFilter(primitive, task, dt, chunk, array)
+
+
+class PlainFilter:
+    """The paper's Kalman filter where each degree of freedom has a sensor of its own."""
+
+    takes_any_values = True
 
     def __init__(self, primitive: Primitive, task: Task, dt: float, chunk: int, array: SensorArray) -> None:
-        self._primitive, self._task, self._dt, self._chunk, self._array = primitive, task, dt, chunk, array
+        self._primitive, self._task, self._dt, self._array = primitive, task, dt, array
         self._step = 0
-        self._load()
+        self._load(chunk)
+        self._record = np.zeros((RECORD_SIZE, self._system.shape[1]))
+        start, n = self._systems, len(array.outputs)
+        self._record[:3, :n], self._record[3:12, :n] = start.initial_mean.T, start.initial_covariance.reshape(-1, 9).T
+
+    def step(self, observation: FloatArray) -> RecordedTick:
+        """Alg. 2, lines 3-8."""
+        k = self._step - self._first
+        if k == len(self._inputs):
+            self._load(LATER_CHUNK)
+            k = 0
+        record = np.empty(self._record.shape)
+        n_fused = kernels.filter_step(self._system, self._inputs[k], observation, self._record, record)
+        if n_fused < 0:
+            check_array(observation, "observation", observation.shape, missing=True)
+        self._record, self._step = record, self._step + 1
+        return RecordedTick(n_fused, record[:, : len(observation)])
+
+    def _load(self, chunk: int) -> None:
+        self._first = self._step
+        model = linear_gaussian_model(self._primitive, self._task, self._dt, chunk + 1, self._step)
+        self._systems = s = scalar_systems(sensed_system(model, self._array))
+        transition = s.transition.reshape(len(s.noise), -1)
+        self._system = _padded(np.concatenate([transition, s.input_vector, s.sensor, s.noise[:, None]], axis=1).T)
+        self._system[-1, len(s.noise) :] = 1.0  # noise of nothing, which is divided by
+        inputs = np.concatenate([s.drifts, s.input_variances[..., None]], axis=-1)
+        self._inputs = list(_padded(inputs.swapaxes(1, 2)))
+
+
+def _padded(rows: FloatArray) -> FloatArray:
+    """Rows (…, S) as long as the kernel wants them, with zeros beyond S."""
+    missing = -rows.shape[-1] % kernels.LANE
+    return np.ascontiguousarray(np.concatenate([rows, np.zeros((*rows.shape[:-1], missing))], axis=-1))
+
+
+class IndependentFilter:
+    """The paper's Kalman filter, whatever the sensors."""
+
+    takes_any_values = False
+
+    def __init__(self, primitive: Primitive, task: Task, dt: float, chunk: int, array: SensorArray) -> None:
+        self._primitive, self._task, self._dt, self._array = primitive, task, dt, array
+        self._step = 0
+        self._load(chunk)
         self._mean, self._covariance = self._model.initial_mean, self._model.initial_covariance
 
-    def update(self, observation: FloatArray) -> Sensed:
-        """Alg. 2, lines 5-8."""
+    def step(self, observation: FloatArray) -> Tick:
+        """Alg. 2, lines 5-8, then lines 3-4."""
         array = self._array
-        looked = look_through(array, observation, self._mean, self._covariance)
-        seen = update(self._mean, self._covariance, looked)
-        self._mean, self._covariance = seen.mean, seen.covariance
+        seen = update(self._mean, self._covariance, look_through(array, observation, self._mean, self._covariance))
         innovations, covariance, fused = seen.innovation, seen.innovation_covariance, seen.fused
-        if array.is_plain and not array.is_coupled:
-            spread = np.diag(covariance[:, 0, 0])
-            return Sensed(seen.log_likelihood, innovations[:, 0], spread, fused[:, 0])
         if not array.is_coupled:
             innovations, fused = array.flat(innovations.ravel()), array.flat(fused.reshape(-1))
             covariance = array.flat_covariances(block_diagonal(covariance))
-        return Sensed(output_shares(np.where(fused, innovations, np.nan), covariance), innovations, covariance, fused)
-
-    def predict(self) -> tuple[FloatArray, FloatArray]:
-        """Alg. 2, lines 3-4."""
-        if self._step - self._first == len(self._drifts):
-            self._load()
         k = self._step - self._first
-        self._mean, self._covariance = predict(
-            self._mean, self._covariance, self._model.transition, self._drifts[k], self._process_covariances[k]
-        )
+        if k == len(self._drifts):
+            self._load(LATER_CHUNK)
+            k = 0
+        transition, drift, noise = self._model.transition, self._drifts[k], self._process_covariances[k]
+        self._mean, self._covariance = predict(seen.mean, seen.covariance, transition, drift, noise)
         self._step += 1
-        return of_each_dof(self._array, self._mean, self._covariance)
+        shares = output_shares(np.where(fused, innovations, np.nan), covariance)
+        state = of_each_dof(array, self._mean, self._covariance)
+        return Tick(int(fused.sum()), *state, shares, innovations, covariance, fused)
 
-    def _load(self) -> None:
+    def _load(self, chunk: int) -> None:
         self._first = self._step
-        model = linear_gaussian_model(self._primitive, self._task, self._dt, self._chunk, self._step)
+        model = linear_gaussian_model(self._primitive, self._task, self._dt, chunk + 1, self._step)
         self._model = sensed_system(model, self._array)
         self._drifts, self._process_covariances = self._model.drifts(), self._model.process_covariances()
 
 
 class JointFilter:
-    """Conditioning of parameters that stay and of what deviates from them; arguments as for `IndependentFilter`."""
+    """Conditioning of parameters that stay and of what deviates from them."""
+
+    takes_any_values = False
 
     def __init__(self, primitive: Primitive, task: Task, dt: float, chunk: int, array: SensorArray) -> None:
-        self._primitive, self._chunk, self._array = primitive, chunk, array
+        self._primitive, self._array = primitive, array
         self._duration, self._phase_step = task.duration, float(dt / task.duration)
         self._responses = parameter_responses(primitive.configuration, self._phase_step, chunk)
         self._first, self._step = 0, 0
@@ -107,29 +149,20 @@ class JointFilter:
         self._transition, self._noise = (part[0] for part in system.grouped(array.is_coupled))
         self._deviation = start_deviation(self._model, array.is_coupled)
 
-    def update(self, observation: FloatArray) -> Sensed:
-        """Condition on what was measured."""
+    def step(self, observation: FloatArray) -> Tick:
+        """Condition on what was measured; the parameters stay, what deviates from them goes on."""
         array = self._array
-        seen, self._deviation, *_ = update_joint(self._model, self._deviation, self._rows(), observation, array)
+        seen, deviation, *_ = update_joint(self._model, self._deviation, self._rows(), observation, array)
         self._model = self._model._replace(belief=seen.belief)
-        covariance = array.flat_covariances(seen.innovation_covariance)
-        return Sensed(array.flat(seen.log_likelihoods), array.flat(seen.innovation), covariance, array.flat(seen.fused))
-
-    def predict(self) -> tuple[FloatArray, FloatArray]:
-        """The parameters stay, what deviates from them goes on; the state is another function of them."""
         self._step += 1
-        self._deviation = predict_deviation(self._deviation, self._transition, self._noise)
+        self._deviation = predict_deviation(deviation, self._transition, self._noise)
         if self._step - self._first == len(self._responses):
-            last = self._responses[-1]
-            before, self._first = self._step - 1, self._step
-            self._responses = continue_responses(self._primitive.configuration, self._phase_step, self._chunk, before, last)
-        return state_moments(self._model, self._deviation, self._rows())
+            last, before, self._first = self._responses[-1], self._step - 1, self._step
+            self._responses = continue_responses(self._primitive.configuration, self._phase_step, LATER_CHUNK, before, last)
+        mean, covariance = state_moments(self._model, self._deviation, self._rows())
+        innovations, fused = array.flat(seen.innovation), array.flat(seen.fused)
+        said = (array.flat(seen.log_likelihoods), innovations, array.flat_covariances(seen.innovation_covariance), fused)
+        return Tick(int(fused.sum()), mean, covariance, *said)
 
     def _rows(self) -> FloatArray:
         return state_rows(self._responses[self._step - self._first], self._duration)
-
-
-STEP_FILTERS: dict[str, Callable[[Primitive, Task, float, int, SensorArray], StepFilter]] = {
-    "independent": IndependentFilter,
-    "joint": JointFilter,
-}

@@ -24,6 +24,7 @@
 
 #define MOST_STATES 4
 #define TILE 512 /* observations of each that are brought side by side at a time */
+#define LARGEST_MAGNITUDE 1e100 /* see checks.py */
 #define LOG_2PI 1.8378770664093453
 
 /* ---- Arrays ------------------------------------------------------------------------------------------------------------- */
@@ -103,6 +104,8 @@ typedef double Vector __attribute__((vector_size(32)));
 typedef double Anywhere __attribute__((vector_size(32), aligned(8), may_alias)); /* in memory */
 #define PARTS 2
 #define UNROLL _Pragma("GCC unroll 4")
+typedef long long Mask __attribute__((vector_size(32)));
+#define MASK Mask
 #if defined(__has_builtin)
 #if __has_builtin(__builtin_shufflevector)
 #define SHUFFLE __builtin_shufflevector
@@ -138,6 +141,10 @@ typedef struct {
 #define update NAMED(update)
 #define filter_system NAMED(filter_system)
 #define load NAMED(load)
+#define quotient NAMED(quotient)
+#define plus_product NAMED(plus_product)
+#define where_seen NAMED(where_seen)
+#define step_lane NAMED(step_lane)
 #define store NAMED(store)
 #define times NAMED(times)
 #define plus NAMED(plus)
@@ -217,13 +224,18 @@ static PyObject *filter_step(PyObject *module, PyObject *const *arguments, Py_ss
     enum { COUNT = sizeof(specs) / sizeof(specs[0]) };
     Array x[COUNT];
     if (take(arguments, given, specs, COUNT, x) < 0) return NULL;
-    const Py_ssize_t d = x[2].view.shape[0], n = x[1].view.shape[1] - 1;
-    double total = 0;
-    const int fits = few_states(n) && agree(&x[0], "system", d, n * n + 2 * n + 1, 0, 0) && agree(&x[1], "inputs", d, n + 1, 0, 0)
-                     && agree(&x[3], "before", d, n * n + n + 3, 0, 0) && agree(&x[4], "after", d, n * n + n + 3, 0, 0);
-    if (fits) total = CHOOSE(step_all)((int)n, d, x[0].data, x[1].data, x[2].data, x[3].data, x[4].data);
+    const Py_ssize_t d = x[2].view.shape[0], stride = x[4].view.shape[1], n = x[1].view.shape[0] - 1;
+    Py_ssize_t n_seen = 0;
+    int fits = few_states(n) && agree(&x[0], "system", n * n + 2 * n + 1, stride, 0, 0)
+               && agree(&x[1], "inputs", n + 1, stride, 0, 0) && agree(&x[3], "before", n * n + n + 3, stride, 0, 0)
+               && agree(&x[4], "after", n * n + n + 3, stride, 0, 0);
+    if (fits && (stride % WIDTH || d > stride || d <= stride - WIDTH)) {
+        PyErr_Format(PyExc_ValueError, "expected rows padded from %zd to a multiple of %d, got %zd", d, WIDTH, stride);
+        fits = 0;
+    }
+    if (fits) n_seen = CHOOSE(step_all)((int)n, d, stride, x[0].data, x[1].data, x[2].data, x[3].data, x[4].data);
     release(x, COUNT);
-    return fits ? PyFloat_FromDouble(total) : NULL;
+    return fits ? PyLong_FromSsize_t(n_seen) : NULL;
 }
 
 /* ---- Series that share their gains -------------------------------------------------------------------------------------- */
@@ -407,29 +419,7 @@ static void filter_all(int n, const Systems *systems)
 #undef BODY
 }
 
-/* A row of `system` holds A, b, c, r of one degree of freedom; of `inputs` its drift and u; of a record its state, m and V, as
-   predicted for a tick, and what was found when that tick was observed: e, S, log-likelihood of the tick BEFORE. */
-static double step_all(int n, Py_ssize_t n_dof, const double *system, const double *inputs, const double *observed,
-                            const double *before, double *after)
-{
-    const int row = n * n + 2 * n + 1, state = n + n * n, record = state + 3;
-    double total = 0;
-#define BODY(k)                                                                                                               \
-    for (Py_ssize_t d = 0; d < n_dof; d++) {                                                                                  \
-        const double *own = system + d * row, *said = inputs + d * (n + 1);                                                   \
-        double *next = after + d * record, gain[MOST_STATES];                                                                 \
-        memcpy(next, before + d * record, state * sizeof(double));                                                            \
-        next[state + 2] = update(k, own + n * n + n, own[row - 1], observed[d], next, next + n, gain, next + state,           \
-                                 next + state + 1);                                                                           \
-        total += next[state + 2];                                                                                             \
-        predict(k, own, own + n * n, said, said[n], next, next + n);                                                          \
-    }
-    WITH_STATES(n, BODY)
-#undef BODY
-    return total;
-}
-
-/* ---- Series that share their gains -------------------------------------------------------------------------------------- */
+/* ---- Lanes -------------------------------------------------------------------------------------------------------------- */
 
 INLINE Lane load(const double *from)
 {
@@ -455,6 +445,122 @@ INLINE Lane plus(Lane sum, double factor, Lane x)
     UNROLL for (int i = 0; i < PARTS; i++) sum.part[i] += factor * x.part[i];
     return sum;
 }
+
+INLINE Lane quotient(Lane x, Lane y)
+{
+    UNROLL for (int i = 0; i < PARTS; i++) x.part[i] /= y.part[i];
+    return x;
+}
+
+/* sum + x y */
+INLINE Lane plus_product(Lane sum, Lane x, Lane y)
+{
+    UNROLL for (int i = 0; i < PARTS; i++) sum.part[i] += x.part[i] * y.part[i];
+    return sum;
+}
+
+/* x, but 0 where e is NaN */
+INLINE Lane where_seen(Lane x, Lane e)
+{
+#ifdef MASK
+    UNROLL for (int i = 0; i < PARTS; i++) x.part[i] = (Vector)((MASK)x.part[i] & (e.part[i] == e.part[i]));
+#else
+    for (int i = 0; i < PARTS; i++) x.part[i] = isnan(e.part[i]) ? 0 : x.part[i];
+#endif
+    return x;
+}
+
+/* ---- filter_step -------------------------------------------------------------------------------------------------------- */
+
+/* WIDTH degrees of freedom at once; each number of theirs is in a row of its own, `stride` long. Rows of `system` are A, b, c, r; of
+   `inputs` the drift and u; of a record m and V of the next tick, then e, S and the log-likelihood of this one. */
+INLINE void step_lane(int n, Py_ssize_t stride, const double *system, const double *inputs, Lane observed, const double *before,
+                      double *after)
+{
+    Lane a[MOST_STATES * MOST_STATES], c[MOST_STATES], m[MOST_STATES], v[MOST_STATES * MOST_STATES], gain[MOST_STATES];
+    Lane kept[MOST_STATES * MOST_STATES], product[MOST_STATES * MOST_STATES], spread[MOST_STATES];
+    const double *b = system + n * n * stride, *drift = inputs;
+    const Lane r = load(b + 2 * n * stride), zero = times(0.0, r), u = load(inputs + n * stride);
+    Lane e = observed, s = r;
+    UNROLL for (int i = 0; i < n; i++) {
+        m[i] = load(before + i * stride);
+        c[i] = load(b + (n + i) * stride);
+        UNROLL for (int j = 0; j < n; j++) {
+            a[i * n + j] = load(system + (i * n + j) * stride);
+            v[i * n + j] = load(before + (n + i * n + j) * stride);
+        }
+    }
+    UNROLL for (int i = 0; i < n; i++) {
+        spread[i] = zero;
+        UNROLL for (int k = 0; k < n; k++) spread[i] = plus_product(spread[i], v[i * n + k], c[k]);
+        e = plus_product(e, times(-1.0, c[i]), m[i]);
+        s = plus_product(s, c[i], spread[i]);
+    }
+    store(after + (n + n * n) * stride, e);
+    store(after + (n + n * n + 1) * stride, s);
+    const Lane seen = where_seen(e, e);
+    UNROLL for (int i = 0; i < n; i++) {
+        gain[i] = where_seen(quotient(spread[i], s), e);
+        m[i] = plus_product(m[i], gain[i], seen);
+        UNROLL for (int j = 0; j < n; j++) kept[i * n + j] = times(-1.0, plus_product(zero, gain[i], c[j]));
+        UNROLL for (int k = 0; k < PARTS; k++) kept[i * n + i].part[k] += 1.0;
+    }
+    UNROLL for (int i = 0; i < n; i++) /* V <- (I - K c) V (I - K c)^T + r K K^T */
+        UNROLL for (int j = 0; j < n; j++) {
+            product[i * n + j] = zero;
+            UNROLL for (int k = 0; k < n; k++)
+                product[i * n + j] = plus_product(product[i * n + j], kept[i * n + k], v[k * n + j]);
+        }
+    UNROLL for (int i = 0; i < n; i++)
+        UNROLL for (int j = 0; j <= i; j++) {
+            Lane sum = plus_product(zero, plus_product(zero, r, gain[i]), gain[j]);
+            UNROLL for (int k = 0; k < n; k++) sum = plus_product(sum, product[i * n + k], kept[j * n + k]);
+            v[i * n + j] = v[j * n + i] = sum;
+        }
+    UNROLL for (int i = 0; i < n; i++) { /* m <- A m + drift,  V <- A V A^T + u b b^T */
+        Lane mean = load(drift + i * stride);
+        UNROLL for (int k = 0; k < n; k++) mean = plus_product(mean, a[i * n + k], m[k]);
+        store(after + i * stride, mean);
+        UNROLL for (int j = 0; j < n; j++) {
+            product[i * n + j] = zero;
+            UNROLL for (int k = 0; k < n; k++)
+                product[i * n + j] = plus_product(product[i * n + j], a[i * n + k], v[k * n + j]);
+        }
+    }
+    UNROLL for (int i = 0; i < n; i++)
+        UNROLL for (int j = 0; j <= i; j++) {
+            Lane sum = plus_product(zero, plus_product(zero, u, load(b + i * stride)), load(b + j * stride));
+            UNROLL for (int k = 0; k < n; k++) sum = plus_product(sum, product[i * n + k], a[j * n + k]);
+            store(after + (n + i * n + j) * stride, sum);
+            store(after + (n + j * n + i) * stride, sum);
+        }
+}
+
+/* How many were observed; -1 if one cannot be squared. The rows are padded to a multiple of WIDTH. */
+static Py_ssize_t step_all(int n, Py_ssize_t n_dof, Py_ssize_t stride, const double *system, const double *inputs,
+                           const double *observed, const double *before, double *after)
+{
+    const double *e = after + (n + n * n) * stride, *s = e + stride;
+    double *log_likelihood = after + (n + n * n + 2) * stride;
+    Py_ssize_t n_seen = 0;
+    for (Py_ssize_t d = 0; d < n_dof; d++) {
+        if (fabs(observed[d]) > LARGEST_MAGNITUDE) return -1;
+        n_seen += !isnan(observed[d]);
+    }
+    for (Py_ssize_t d = 0; d < stride; d += WIDTH) {
+        double padded[WIDTH] = {0};
+        if (d + WIDTH > n_dof) memcpy(padded, observed + d, (n_dof - d) * sizeof(double));
+        const Lane o = load(d + WIDTH > n_dof ? padded : observed + d);
+#define BODY(k) step_lane(k, stride, system + d, inputs + d, o, before + d, after + d)
+        WITH_STATES(n, BODY)
+#undef BODY
+    }
+    for (Py_ssize_t d = 0; d < stride; d++)
+        log_likelihood[d] = isnan(e[d]) ? 0 : -0.5 * (e[d] * e[d] / s[d] + log(s[d]) + LOG_2PI);
+    return n_seen;
+}
+
+/* ---- Series that share their gains -------------------------------------------------------------------------------------- */
 
 /* Observations less their path, `steps` times of WIDTH series from `first` on, side by side: tile[(t, d)][series]. */
 INLINE void bring_together(const Series *s, Py_ssize_t first, Py_ssize_t start, Py_ssize_t steps, double *tile)

@@ -7,7 +7,7 @@ All arrays are float64 and C-contiguous; the last arguments are written to. NaN 
 
 import numpy as np
 
-from probdmp.checks import FloatArray
+from probdmp.checks import LARGEST_MAGNITUDE, FloatArray
 
 __all__ = ["filter_step", "filter_systems", "smoothed_states", "squared_innovations"]
 
@@ -55,32 +55,34 @@ def filter_systems(
         means[t], covariances[t] = mean, covariance
 
 
-def filter_step(
-    system: FloatArray, inputs: FloatArray, observation: FloatArray, before: FloatArray, after: FloatArray
-) -> float:
-    """One tick of D systems: update with what was observed, then predict.
+def filter_step(system: FloatArray, inputs: FloatArray, observation: FloatArray, before: FloatArray, after: FloatArray) -> int:
+    """One tick of D systems: update with what was observed, then predict. Each number of theirs has a row of length W >= D.
 
     Parameters
     ----------
-    system : (D, n n + 2 n + 1) array, a row A, b, c, r for each.
-    inputs : (D, n + 1) array, drift and input variance of the step that follows.
+    system : (n n + 2 n + 1, W) array, rows A, b, c, r.
+    inputs : (n + 1, W) array, drift and input variance of the step that follows.
     observation : (D,) array.
-    before : (D, n + n n + 3) array, the record whose first entries are m and V of the state as predicted.
+    before : (n + n n + 3, W) array, the record whose first rows are m and V of the state as predicted.
     after : written, likewise: m and V of the next tick, then innovation, its variance S and log-likelihood of this one.
 
     Returns
     -------
-    Log-likelihood of this tick, nats; 0 where nothing was observed.
+    How many were observed; -1 if one is infinite, or too large to be squared, and then nothing is written.
     """
-    n, d = inputs.shape[1] - 1, len(observation)
-    a, (b, c, r) = system[:, : n * n].reshape(d, n, n), np.split(system[:, n * n :], [n, 2 * n], axis=1)
+    if np.any(np.abs(observation) > LARGEST_MAGNITUDE):
+        return -1
+    n, width = len(inputs) - 1, inputs.shape[1]
+    a, (b, c, r) = system[: n * n].T.reshape(width, n, n), np.split(system[n * n :].T, [n, 2 * n], axis=1)
+    observed = np.zeros(width)
+    observed[: len(observation)] = observation
     mean, covariance, innovation, variance, log_likelihood, _ = _update(
-        c, r[:, 0], observation, before[:, :n], before[:, n : n + n * n].reshape(d, n, n)
+        c, r[:, 0], observed, before[:n].T, before[n : n + n * n].T.reshape(width, n, n)
     )
-    mean, covariance = _predict(a, b, inputs[:, :n], inputs[:, n], mean, covariance)
-    after[:, :n], after[:, n : n + n * n] = mean, covariance.reshape(d, -1)
-    after[:, -3], after[:, -2], after[:, -1] = innovation, variance, log_likelihood
-    return float(log_likelihood.sum())
+    mean, covariance = _predict(a, b, inputs[:n].T, inputs[n], mean, covariance)
+    after[:n], after[n : n + n * n] = mean.T, covariance.reshape(width, -1).T
+    after[-3], after[-2], after[-1] = innovation, variance, log_likelihood
+    return int(np.sum(~np.isnan(observation)))
 
 
 def squared_innovations(

@@ -11,7 +11,16 @@ from types import ModuleType
 
 from probdmp.gaussian import _kernels_numpy
 
-__all__ = ["COMPILED", "MOST_STATES", "filter_step", "filter_systems", "in_threads", "smoothed_states", "squared_innovations"]
+__all__ = [
+    "COMPILED",
+    "LANE",
+    "MOST_STATES",
+    "filter_step",
+    "filter_systems",
+    "in_threads",
+    "smoothed_states",
+    "squared_innovations",
+]
 
 
 def _chosen() -> ModuleType:
@@ -27,11 +36,13 @@ def _chosen() -> ModuleType:
 _kernels = _chosen()
 COMPILED = _kernels is not _kernels_numpy
 """Whether the compiled kernels are in use."""
+LANE = 8
+"""Systems that `filter_step` filters at once: its rows are padded to a multiple of it."""
 MOST_STATES = 4
 """States of a system that the kernels can filter."""
 
 filter_systems: Callable[..., None] = _kernels.filter_systems
-filter_step: Callable[..., float] = _kernels.filter_step
+filter_step: Callable[..., int] = _kernels.filter_step
 squared_innovations: Callable[..., None] = _kernels.squared_innovations
 smoothed_states: Callable[..., None] = _kernels.smoothed_states
 

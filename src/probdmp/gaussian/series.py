@@ -10,11 +10,11 @@ and smoothed by one backwards, rho[t] = c e[t] / S[t] + F[t]^T rho[t+1], d[t] + 
 Recordings lie row by row in memory, (N, T, D), and are not copied.
 """
 
-from typing import NamedTuple, TypeGuard
+from typing import NamedTuple
 
 import numpy as np
 
-from probdmp.checks import LARGEST_MAGNITUDE, FloatArray, IntArray, check_array, check_count
+from probdmp.checks import LARGEST_MAGNITUDE, FloatArray, IntArray, check_array, check_count, is_plain
 from probdmp.errors import InputError
 from probdmp.gaussian import kernels
 from probdmp.gaussian.density import LOG_2PI
@@ -171,11 +171,6 @@ def _checked(gains: SharedGains, observations: FloatArray, paths: FloatArray | N
     if paths is None:
         return observed, gains.path[None]
     return observed, check_array(paths, "paths", observed.shape)
-
-
-def is_plain(array: object) -> TypeGuard[FloatArray]:
-    """Whether the kernels take it as it is; looking at all of its values would take longer than to filter them."""
-    return isinstance(array, np.ndarray) and array.dtype == np.float64 and array.flags.c_contiguous
 
 
 def _scores_of_own(gains: SharedGains, observed: FloatArray, expected: FloatArray, which: IntArray) -> FloatArray:

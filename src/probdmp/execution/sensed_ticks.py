@@ -1,0 +1,116 @@
+"""What a filter finds at one tick of an execution: what the sensors said, and the state to be reached at the next tick."""
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from probdmp.checks import BoolArray, FloatArray
+
+__all__ = ["RECORD_SIZE", "RecordedTick", "SensedTick", "Tick"]
+
+RECORD_SIZE = 15
+"""Numbers about a signal: mean (3) and covariance (9) of its next state, innovation, its variance, log-likelihood."""
+
+
+class SensedTick(Protocol):
+    """One tick; S signals, O outputs of the sensors."""
+
+    @property
+    def n_fused(self) -> int:
+        """Outputs that were measured and believed."""
+        ...
+
+    @property
+    def mean(self) -> FloatArray:
+        """(S, 3) array: the state at the next tick, in data units and seconds."""
+        ...
+
+    @property
+    def covariance(self) -> FloatArray:
+        """(S, 3, 3) array."""
+        ...
+
+    @property
+    def contributions(self) -> FloatArray:
+        """(O,) array, nats: the share of each output in the log-likelihood of this tick."""
+        ...
+
+    @property
+    def innovations(self) -> FloatArray:
+        """(O,) array, units of the outputs; NaN where not seen."""
+        ...
+
+    @property
+    def innovation_covariance(self) -> FloatArray:
+        """(O, O) array, whether seen or not."""
+        ...
+
+    @property
+    def innovation_variances(self) -> FloatArray:
+        """(O,) array, its diagonal."""
+        ...
+
+    @property
+    def fused(self) -> BoolArray:
+        """(O,) array: what was seen and believed."""
+        ...
+
+
+class Tick(NamedTuple):
+    """A tick with its arrays; see `SensedTick` for each."""
+
+    n_fused: int
+    mean: FloatArray
+    covariance: FloatArray
+    contributions: FloatArray
+    innovations: FloatArray
+    innovation_covariance: FloatArray
+    fused: BoolArray
+
+    @property
+    def innovation_variances(self) -> FloatArray:
+        """(O,) array."""
+        return np.diagonal(self.innovation_covariance)
+
+
+class RecordedTick(NamedTuple):
+    """A tick as the kernel writes it, one output for each signal; arrays are made of it when they are asked for."""
+
+    n_fused: int
+    record: FloatArray
+    """(RECORD_SIZE, S) array."""
+
+    @property
+    def mean(self) -> FloatArray:
+        """(S, 3) array."""
+        return self.record[:3].T
+
+    @property
+    def covariance(self) -> FloatArray:
+        """(S, 3, 3) array."""
+        return self.record[3:12].reshape(3, 3, -1).transpose(2, 0, 1)
+
+    @property
+    def contributions(self) -> FloatArray:
+        """(S,) array."""
+        return self.record[14]
+
+    @property
+    def innovations(self) -> FloatArray:
+        """(S,) array."""
+        return self.record[12]
+
+    @property
+    def innovation_covariance(self) -> FloatArray:
+        """(S, S) array."""
+        return np.diag(self.record[13])
+
+    @property
+    def innovation_variances(self) -> FloatArray:
+        """(S,) array."""
+        return self.record[13]
+
+    @property
+    def fused(self) -> BoolArray:
+        """(S,) array."""
+        return ~np.isnan(self.record[12])
