@@ -5,7 +5,7 @@ from probdmp.dmp.configuration import PUBLISHED, Configuration
 from probdmp.dmp.path_distribution import path_distribution
 from probdmp.dmp.primitive import Primitive, task_for
 from probdmp.dmp.state_space import control_inputs, linear_gaussian_model, step_count
-from probdmp.dmp.task import Task, demonstrated_tasks, stack_tasks, unstack_tasks
+from probdmp.dmp.task import Task, demonstrated_tasks, stack_tasks, take_tasks, unstack_tasks
 from probdmp.dmp.variation import PathDistribution, Variation
 from probdmp.dmp.via_points import ViaPoint, condition_primitive
 
@@ -26,6 +26,7 @@ __all__ = [
     "path_distribution",
     "stack_tasks",
     "step_count",
+    "take_tasks",
     "task_for",
     "unstack_tasks",
 ]

@@ -77,11 +77,14 @@ def joint_model(primitive: Primitive, task: Task, end_rows: FloatArray) -> Joint
     """
     batch, handling = task.start.shape[:-1], primitive.configuration.goal_handling
     mean, factor = _start_and_parameters(primitive)
-    factors = np.array(np.broadcast_to(factor, (*batch, *factor.shape)))
-    factors[..., : primitive.n_dof, START, :] *= np.isnan(task.start)[..., None]
+    unknown = np.isnan(task.start)
+    if end_rows.shape[:-1] == (1,):  # what is told, and when it ends, is the same for all
+        unknown = unknown[:1]
+    factors = np.array(np.broadcast_to(factor, (*unknown.shape[:-1], *factor.shape)))
+    factors[..., : primitive.n_dof, START, :] *= unknown[..., None]
     means = np.array(np.broadcast_to(mean, (*batch, *mean.shape)))
     means[..., : primitive.n_dof, START] = primitive.starts(task)
-    model = JointModel(means, factors, unit_belief(batch, factor.shape[-1]))
+    model = JointModel(means, factors, unit_belief(unknown.shape[:-1], factor.shape[-1]))
     signals, n_untold = primitive.signals, len(primitive.channel_names)
 
     def of_signals(told: FloatArray) -> FloatArray:  # nobody tells a channel where it has to be
@@ -129,19 +132,23 @@ def state_designs(model: JointModel, rows: FloatArray) -> tuple[FloatArray, Floa
 def joint_executions(primitive: Primitive, tasks: Task, dts: FloatArray, n_steps: int) -> JointExecutions:
     """What is known about executions before they begin.
 
+    With one dt for all of them they last equally long and are told the same kinds of things: then all but the means is
+    common to them, and has a batch axis of length 1.
+
     Parameters
     ----------
     tasks : a batch (N) of tasks.
-    dts : (N) array, seconds.
+    dts : (N) or (1) array, seconds.
     n_steps : T.
     """
-    steps, configuration = dts / tasks.duration, primitive.configuration
+    durations, configuration = tasks.duration[: len(dts)], primitive.configuration
+    steps = dts / durations
     lasts = np.round(1 / steps).astype(np.intp)
     length = max(n_steps, int(lasts.max()) + 1)
     responses = np.stack([parameter_responses(configuration, float(step), length) for step in steps], axis=1)
-    rows = state_rows(responses, tasks.duration)
+    rows = state_rows(responses, durations)
     end_rows = rows[lasts, np.arange(len(steps)), POSITION]
-    system = deviation_system(primitive, tasks.duration, dts)
+    system = deviation_system(primitive, durations, dts)
     return JointExecutions(joint_model(primitive, tasks, end_rows), rows[:n_steps], system)
 
 

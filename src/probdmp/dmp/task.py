@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from probdmp.checks import SECONDS, FloatArray, check_array, frozen, shape_text
+from probdmp.checks import SECONDS, FloatArray, IntArray, check_array, frozen, shape_text
 from probdmp.demonstrations import Demonstration
 from probdmp.errors import InputError
 
-__all__ = ["Task", "demonstrated_tasks", "stack_tasks", "unstack_tasks"]
+__all__ = ["Task", "demonstrated_tasks", "stack_tasks", "take_tasks", "unstack_tasks"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,6 +53,12 @@ def stack_tasks(tasks: Sequence[Task]) -> Task:
         np.stack([t.duration for t in tasks]),
         np.stack([unknown if t.start_velocity is None else t.start_velocity for t in tasks]),
     )
+
+
+def take_tasks(tasks: Task, members: Sequence[int] | IntArray) -> Task:
+    """Some of a batch (N) of tasks, as a batch."""
+    velocities = None if tasks.start_velocity is None else tasks.start_velocity[members]
+    return Task(tasks.start[members], tasks.goal[members], tasks.duration[members], velocities)
 
 
 def unstack_tasks(tasks: Task) -> list[Task]:

@@ -1,6 +1,6 @@
 """Running a primitive: rollout, tracking, smoothing and sampling of recordings, online execution."""
 
-from probdmp.execution.execution_batch import ExecutionBatch, score_batch
+from probdmp.execution.execution_batch import ExecutionBatch
 from probdmp.execution.execution_step import ExecutionStep, Judgement
 from probdmp.execution.feedback_gains import feedback_gains
 from probdmp.execution.online import Monitor, Observed, OnlineExecution
@@ -10,13 +10,13 @@ from probdmp.execution.readings import readings_of, recording_of_readings
 from probdmp.execution.recordings import (
     check_tasks,
     filter_recordings,
-    score_recordings,
     smooth_recording,
     smooth_recordings,
     task_of_recording,
     track_recording,
 )
 from probdmp.execution.rollout import position_covariances, roll_out, sample_recordings, sample_states, sample_trajectories
+from probdmp.execution.scoring import score_batch, score_recordings
 from probdmp.execution.sensor_array import SensorArray
 from probdmp.execution.sensor_noise import SensorNoise, estimate_sensor_noise
 from probdmp.execution.sensor_reports import SensorCounts, SensorTrack

@@ -160,9 +160,12 @@ def update_joint(
 def state_moments(model: JointModel, deviation: Deviation, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Mean (*batch, S, 3) and covariance (*batch, S, 3, 3) of the states of one time."""
     offsets, designs = state_designs(model, rows)
-    belief, own = model.belief, deviation.covariance
-    shared = belief._replace(mean=belief.mean[..., None, :], covariance=belief.covariance[..., None, :, :])
-    means, covariances = linear_moments(shared, designs + deviation.loading.reshape(designs.shape))
+    (mean, covariance), own = model.belief, deviation.covariance
+    designs = designs + deviation.loading.reshape(designs.shape)
+    flat = designs.reshape(*designs.shape[:-3], -1, designs.shape[-1])  # one product for all signals
+    means = np.matmul(flat, mean[..., None])[..., 0].reshape(offsets.shape)
+    covariances = (flat @ covariance).reshape(designs.shape) @ designs.mT
+    covariances = (covariances + covariances.mT) / 2
     if own.shape[-1] > 3:  # one group of all signals
         n_signals = offsets.shape[-2]
         blocks = own.reshape(*own.shape[:-3], n_signals, 3, n_signals, 3)

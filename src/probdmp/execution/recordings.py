@@ -23,9 +23,10 @@ from probdmp.execution.trajectory import GaussianTrajectory, TrackedTrajectory
 from probdmp.gaussian import GaussianSequence
 
 __all__ = [
+    "BATCH_SIZE",
+    "check_recordings",
     "check_tasks",
     "filter_recordings",
-    "score_recordings",
     "smooth_recording",
     "smooth_recordings",
     "task_of_recording",
@@ -53,7 +54,7 @@ def task_of_recording(
     duration : seconds; the length of the recording unless given.
     start_velocity : (D,) array, data units per second; as learned, with its variance, unless given.
     """
-    _check_recordings(primitive, [recording])
+    check_recordings(primitive, [recording])
     start = recording.positions[0] if start is None else start
     return task_for(primitive, start, goal, recording.duration if duration is None else duration, start_velocity)
 
@@ -88,16 +89,6 @@ def smooth_recording(
     array = SensorArray(primitive) if sensors is None else sensors
     smoothed = smooth_recordings(primitive, [task], [recording], array)
     return GaussianTrajectory(**trajectory_parts(primitive, recording.times, smoothed))
-
-
-def score_recordings(
-    primitive: Primitive, tasks: Sequence[Task], recordings: Sequence[Demonstration], sensors: SensorArray | None = None
-) -> FloatArray:
-    """Total log-likelihood of each recording given its task, (N,) array, nats."""
-    check_tasks(tasks, recordings)
-    batches = [slice(i, i + BATCH_SIZE) for i in range(0, len(recordings), BATCH_SIZE)]
-    forward = [filter_recordings(primitive, tasks[batch], recordings[batch], sensors) for batch in batches]
-    return np.concatenate([part.log_likelihoods.sum((0, -1)) for part in forward])
 
 
 def check_tasks(tasks: Sequence[Task], recordings: Sequence[Demonstration]) -> Sequence[Task]:
@@ -136,13 +127,13 @@ def _observed(
     sensors: SensorArray | None,
 ) -> tuple[Any, FloatArray, SensorArray]:
     """The executions before they begin, what was measured, (T, N, O), and by what."""
-    _check_recordings(primitive, recordings)
+    check_recordings(primitive, recordings)
     array = SensorArray(primitive) if sensors is None else sensors
     measured, dts = stack_readings(array, recordings), np.array([r.dt for r in recordings])
     return inference.prepare(primitive, stack_tasks(tasks), dts, len(measured)), measured, array
 
 
-def _check_recordings(primitive: Primitive, recordings: Sequence[Demonstration]) -> None:
+def check_recordings(primitive: Primitive, recordings: Sequence[Demonstration]) -> None:
     """Refuse recordings of other degrees of freedom, in another order, or in other units than the primitive has."""
     for recording in recordings:
         if recording.n_dof != primitive.n_dof or (recording.has_names and recording.names != primitive.names):

@@ -49,14 +49,15 @@ class SensorArray:
         scales = primitive.ranges[:, None] * primitive.duration ** np.array([-2.0, -1.0, 0.0])
         self._scales = scales.ravel()
         covariance = np.zeros((len(self.outputs),) * 2)
-        self._matrix = np.zeros((len(self.outputs), 3 * self._n_signals))
+        self.dense_matrix = np.zeros((len(self.outputs), 3 * self._n_signals))
         for sensor in self.sensors:
             part = self.slices[sensor.name]
             covariance[part, part] = sensor.covariance
             if isinstance(sensor, LinearSensor):
-                self._matrix[part, : sensor.matrix.shape[1]] = sensor.matrix
+                self.dense_matrix[part, : sensor.matrix.shape[1]] = sensor.matrix
             elif isinstance(sensor, ChannelSensor):
-                self._matrix[part, 3 * primitive.signals.names.index(sensor.name) + POSITION] = 1.0
+                self.dense_matrix[part, 3 * primitive.signals.names.index(sensor.name) + POSITION] = 1.0
+        # C of all states, (O, 3 S); rows of nonlinear sensors are zero.
         self.silent = np.isposinf(np.diagonal(covariance))
         """(O,) outputs whose noise is infinite: what they say is never used."""
         self.covariance = np.where(self.silent[:, None] | self.silent, np.eye(len(covariance)), covariance)
@@ -71,7 +72,7 @@ class SensorArray:
     def _output_scales(self, primitive: Primitive) -> FloatArray:
         ranges = np.repeat(primitive.signals.ranges, 3)
         ranges[: len(self._scales)] = self._scales
-        matrix, mean = np.array(self._matrix), np.zeros(len(ranges))
+        matrix, mean = np.array(self.dense_matrix), np.zeros(len(ranges))
         mean[POSITION : len(self._scales) : 3] = primitive.start
         for sensor in self._nonlinear:
             rows, function = self._rows(sensor), self._function(sensor)
@@ -84,18 +85,18 @@ class SensorArray:
     def _find_signals(self) -> None:
         """Which outputs measure a position or a channel as it is; of several for one signal the most precise."""
         units = np.eye(3 * self._n_signals)[POSITION::3]
-        direct = [np.flatnonzero((self._matrix == unit).all(axis=1) & ~self.silent) for unit in units]
+        direct = [np.flatnonzero((self.dense_matrix == unit).all(axis=1) & ~self.silent) for unit in units]
         variances = np.diagonal(self.covariance)
         self.measured = np.array([len(found) > 0 for found in direct])
         """(S,) positions and channels that are measured as they are."""
         self._measuring = np.array([found[np.argmin(variances[found])] for found in direct if len(found)], dtype=np.int64)
-        self._direct_outputs = (self._matrix[:, None] == units).all(axis=-1).any(axis=1)
+        self._direct_outputs = (self.dense_matrix[:, None] == units).all(axis=-1).any(axis=1)
         every = np.arange(self._n_signals)
         self._is_direct = len(self.outputs) == self._n_signals and np.array_equal(self._measuring, every)
 
     def _group(self) -> None:
         """Which outputs belong to which group of states, and C and R of the groups."""
-        touched = np.abs(self._matrix).reshape(len(self.outputs), self._n_signals, 3).any(axis=-1)
+        touched = np.abs(self.dense_matrix).reshape(len(self.outputs), self._n_signals, 3).any(axis=-1)
         owners = np.argmax(touched, axis=1)
         strangers = owners[:, None] != owners
         self.is_coupled = bool(self._nonlinear or np.any(touched.sum(axis=1) > 1) or np.any(self.covariance[strangers] != 0))
@@ -106,7 +107,7 @@ class SensorArray:
         n_groups, size, n = len(counts), int(counts.max()), 3 * self._n_signals // len(counts)
         slots = np.array([int(np.sum(owners[:i] == owner)) for i, owner in enumerate(owners)])
         self._places = owners * size + slots
-        by_group = self._matrix.reshape(len(self.outputs), n_groups, n)
+        by_group = self.dense_matrix.reshape(len(self.outputs), n_groups, n)
         self.matrix, self.noise = np.zeros((n_groups, size, n)), np.tile(np.eye(size), (n_groups, 1, 1))
         self.matrix[owners, slots] = by_group[np.arange(len(owners)), owners]
         for group in range(n_groups):
@@ -158,9 +159,9 @@ class SensorArray:
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """An observation (*batch, O) as a linear function of all states, of the given moments: values, C (…, O, 3 S), R."""
         if not self._nonlinear:
-            return observation, self._matrix, self.covariance
+            return observation, self.dense_matrix, self.covariance
         batch, values = observation.shape[:-1], np.array(observation)
-        matrix, noise = (np.array(np.broadcast_to(x, (*batch, *x.shape))) for x in (self._matrix, self.covariance))
+        matrix, noise = (np.array(np.broadcast_to(x, (*batch, *x.shape))) for x in (self.dense_matrix, self.covariance))
         for index in np.ndindex(batch):
             for sensor in self._nonlinear:
                 part = self.slices[sensor.name]
@@ -195,7 +196,7 @@ class SensorArray:
 
     def draw(self, states: FloatArray, rng: np.random.Generator) -> FloatArray:
         """Readings of states (*batch, T, 3 S), with noise, (*batch, T, O) array; NaN of outputs that say nothing."""
-        values = states @ self._matrix.T
+        values = states @ self.dense_matrix.T
         for sensor in self._nonlinear:
             part = self.slices[sensor.name]
             for index in np.ndindex(states.shape[:-1]):

@@ -5,20 +5,15 @@ from typing import Protocol
 import numpy as np
 
 from probdmp.checks import FloatArray, check_array
-from probdmp.dmp import Primitive, Task, linear_gaussian_model, stack_tasks
-from probdmp.dmp.joint_model import joint_executions, state_rows
-from probdmp.dmp.responses import continue_responses, parameter_responses
+from probdmp.dmp import Primitive, Task, linear_gaussian_model
 from probdmp.execution.independent_filtering import look_through, of_each_dof, sensed_system
-from probdmp.execution.joint_filtering import start_deviation, state_moments, update_joint
+from probdmp.execution.joint_steps import LATER_CHUNK, joint_filter
 from probdmp.execution.sensed_ticks import RECORD_SIZE, RecordedTick, SensedTick, Tick
 from probdmp.execution.sensor_array import SensorArray
-from probdmp.gaussian import block_diagonal, kernels, output_shares, predict, predict_deviation, update
+from probdmp.gaussian import block_diagonal, kernels, output_shares, predict, update
 from probdmp.gaussian.scalar_systems import scalar_systems
 
 __all__ = ["StepFilter", "step_filter"]
-
-LATER_CHUNK = 64
-"""Ticks that are prepared at a time once the movement is over."""
 
 
 class StepFilter(Protocol):
@@ -43,7 +38,7 @@ def step_filter(primitive: Primitive, task: Task, dt: float, chunk: int, array: 
     chunk : for how many ticks it is prepared; the movement need not end then.
     """
     if primitive.configuration.weight_uncertainty == "joint":
-        return JointFilter(primitive, task, dt, chunk, array)
+        return joint_filter(primitive, task, dt, chunk, array)
     if array.is_plain and not array.is_coupled and not array.is_adaptive and not array.silent.any():
         return PlainFilter(primitive, task, dt, chunk, array)
     return IndependentFilter(primitive, task, dt, chunk, array)
@@ -127,42 +122,3 @@ class IndependentFilter:
         model = linear_gaussian_model(self._primitive, self._task, self._dt, chunk + 1, self._step)
         self._model = sensed_system(model, self._array)
         self._drifts, self._process_covariances = self._model.drifts(), self._model.process_covariances()
-
-
-class JointFilter:
-    """Conditioning of parameters that stay and of what deviates from them."""
-
-    takes_any_values = False
-
-    def __init__(self, primitive: Primitive, task: Task, dt: float, chunk: int, array: SensorArray) -> None:
-        self._primitive, self._array = primitive, array
-        self._duration, self._phase_step = task.duration, float(dt / task.duration)
-        self._responses = parameter_responses(primitive.configuration, self._phase_step, chunk)
-        self._first, self._step = 0, 0
-        batch, _, system = joint_executions(primitive, stack_tasks([task]), np.array([dt]), 1)
-        belief = batch.belief
-        self._model = batch._replace(
-            means=batch.means[0],
-            factors=batch.factors[0],
-            belief=belief._replace(mean=belief.mean[0], covariance=belief.covariance[0]),
-        )
-        self._transition, self._noise = (part[0] for part in system.grouped(array.is_coupled))
-        self._deviation = start_deviation(self._model, array.is_coupled)
-
-    def step(self, observation: FloatArray) -> Tick:
-        """Condition on what was measured; the parameters stay, what deviates from them goes on."""
-        array = self._array
-        seen, deviation, *_ = update_joint(self._model, self._deviation, self._rows(), observation, array)
-        self._model = self._model._replace(belief=seen.belief)
-        self._step += 1
-        self._deviation = predict_deviation(deviation, self._transition, self._noise)
-        if self._step - self._first == len(self._responses):
-            last, before, self._first = self._responses[-1], self._step - 1, self._step
-            self._responses = continue_responses(self._primitive.configuration, self._phase_step, LATER_CHUNK, before, last)
-        mean, covariance = state_moments(self._model, self._deviation, self._rows())
-        innovations, fused = array.flat(seen.innovation), array.flat(seen.fused)
-        said = (array.flat(seen.log_likelihoods), innovations, array.flat_covariances(seen.innovation_covariance), fused)
-        return Tick(int(fused.sum()), mean, covariance, *said)
-
-    def _rows(self) -> FloatArray:
-        return state_rows(self._responses[self._step - self._first], self._duration)

@@ -14,7 +14,7 @@ from probdmp.gaussian.filtering import AffineObservation, FilteredSequence, filt
 from probdmp.gaussian.linearization import Linearization, linearize_extended, linearize_unscented, wrapped
 from probdmp.gaussian.model import GaussianSequence, LinearGaussianModel
 from probdmp.gaussian.sampling import sample_sequences
-from probdmp.gaussian.series import SharedGains, score_series, shared_gains, smooth_series
+from probdmp.gaussian.series import SharedGains, score_series, shared_gains, shifted_paths, smooth_series
 from probdmp.gaussian.smoothing import smooth_sequence
 from probdmp.gaussian.static import Belief, StaticUpdate, linear_moments, observe, unit_belief
 
@@ -45,6 +45,7 @@ __all__ = [
     "sample_sequences",
     "score_series",
     "shared_gains",
+    "shifted_paths",
     "smooth_deviations",
     "smooth_sequence",
     "smooth_series",

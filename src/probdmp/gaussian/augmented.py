@@ -52,6 +52,8 @@ class AugmentedUpdate(NamedTuple):
     """C^T S^-1 C, (*batch, G, n, n)."""
     retentions: FloatArray
     """I - K C, (*batch, G, n, n)."""
+    gains: FloatArray
+    """K, (*batch, G, n, S); 0 where not seen."""
 
 
 def no_deviation(batch: tuple[int, ...], n_states: int, size: int) -> Deviation:
@@ -121,6 +123,7 @@ def observe_deviation(
         weighted @ both,
         weighted @ sensors,
         retention,
+        gain,
     )
 
 

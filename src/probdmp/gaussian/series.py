@@ -21,7 +21,7 @@ from probdmp.gaussian.density import LOG_2PI
 from probdmp.gaussian.model import GaussianSequence, LinearGaussianModel
 from probdmp.gaussian.scalar_systems import ScalarSystems, filter_scalar_systems, is_scalar, scalar_systems
 
-__all__ = ["SharedGains", "score_series", "shared_gains", "smooth_series"]
+__all__ = ["SharedGains", "score_series", "shared_gains", "shifted_paths", "smooth_series"]
 
 MOST_THREADS = 1024
 
@@ -127,6 +127,28 @@ def score_series(
     scores = gains.normalisation - 0.5 * squares
     scores[tuple(incomplete.T)] = _scores_of_own(gains, observed, expected, incomplete)
     return np.asarray(scores.sum(axis=1))
+
+
+def shifted_paths(gains: SharedGains, initial_means: FloatArray, first_inputs: FloatArray) -> FloatArray:
+    """Expected of recordings that begin elsewhere, or whose inputs differ by a constant: (N, T, D) array.
+
+    Parameters
+    ----------
+    initial_means : (N, D, n) array.
+    first_inputs : mean input of the first step, (N, D) array.
+    """
+    systems, path = gains.systems, gains.path
+    a, b = systems.transition, systems.input_vector
+    forward, driven = systems.sensor, np.zeros(len(a))  # c A^t, and c (A^0 + … + A^(t-1)) b
+    responses = np.empty((len(path), len(a), a.shape[-1] + 1))
+    for response in responses:
+        response[:, :-1], response[:, -1] = forward, driven
+        driven = driven + np.sum(forward * b, axis=-1)
+        forward = np.matmul(forward[:, None], a)[:, 0]
+    used = np.argmax(np.abs(b), axis=-1)[:, None]
+    first = np.take_along_axis(systems.drifts[0] / np.where(b == 0, 1.0, b), used, axis=-1)[:, 0]
+    shifts = np.concatenate([initial_means - systems.initial_mean, (first_inputs - first)[..., None]], axis=-1)
+    return path + np.ascontiguousarray(np.moveaxis(np.matmul(shifts.swapaxes(0, 1), responses.transpose(1, 2, 0)), 0, -1))
 
 
 def smooth_series(gains: SharedGains, observations: FloatArray, n_threads: int = 1) -> GaussianSequence:

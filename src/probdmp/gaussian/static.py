@@ -37,6 +37,10 @@ class StaticUpdate(NamedTuple):
     """S, (*batch, O, O), whether seen or not."""
     fused: BoolArray
     """(*batch, O): what was seen and believed."""
+    gain: FloatArray
+    """W of what was fused, (*batch, r, O): z moves by W L^-1 e."""
+    whitening: FloatArray
+    """L^-1, (*batch, O, O)."""
     log_likelihoods: FloatArray
     """(*batch, O), nats: share of each sensor in the log density given the past, 0 where not seen; see `log_density_shares`."""
 
@@ -58,7 +62,7 @@ def observe(
     noise : R, (*batch, O, O), positive definite.
     believed : (*batch, O): what is not is compared with what was expected, and then treated as if it had not been seen.
     """
-    seen = ~np.isnan(observation) & believed
+    seen = _common(~np.isnan(observation) & believed, belief.covariance.shape[:-2])
     innovation = observation - np.matmul(design, belief.mean[..., None])[..., 0]
     spread = belief.covariance @ design.mT
     covariance = design @ spread + noise
@@ -66,7 +70,7 @@ def observe(
     both = seen[..., :, None] & seen[..., None, :]
     known = np.where(both, covariance, np.eye(seen.shape[-1]))
     cholesky = np.linalg.cholesky(known)
-    whitening = np.linalg.inv(cholesky)
+    whitening = np.asarray(np.linalg.inv(cholesky), dtype=np.float64)
     residual = np.where(seen, innovation, 0.0)
     white = np.matmul(whitening, residual[..., None])
     gain = np.where(seen[..., None, :], spread, 0.0) @ whitening.mT
@@ -75,8 +79,17 @@ def observe(
         innovation,
         covariance,
         seen,
+        gain,
+        whitening,
         log_density_shares(residual, np.matmul(whitening.mT, white)[..., 0], known, cholesky, seen),
     )
+
+
+def _common(seen: BoolArray, batch: tuple[int, ...]) -> BoolArray:
+    """Of a batch (N) with one covariance, where the same is seen of all: that, with a batch axis of length 1."""
+    if batch == (1,) and len(seen) > 1 and np.all(seen == seen[0]):
+        return seen[:1]
+    return seen
 
 
 def linear_moments(belief: Belief, design: FloatArray) -> tuple[FloatArray, FloatArray]:

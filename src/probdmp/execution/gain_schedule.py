@@ -1,0 +1,154 @@
+"""Gains of executions whose parameters are constant and unknown: what does not depend on readings, computed once.
+
+How much a reading says, and about what, follows from the model, the time and which readings there are; not from what they read.
+So executions of one primitive that last equally long, are told the same kinds of things and miss the same readings share all
+gains. Each is then filtered by a linear recursion for what deviates from its plan: of the parameters x', of the states around
+them d', and of the latent z',
+
+    e[t] = o[t] - C (plan[t] + s[t]),   s[t] = rows[t] x'[t] + d'[t]
+    (x', d', z') <- (x', d', z') + K[t] e[t],    then d' <- A d'
+"""
+
+from collections import OrderedDict
+from dataclasses import dataclass
+from threading import Lock
+
+import numpy as np
+
+from probdmp.checks import BoolArray, FloatArray
+from probdmp.dmp import Primitive, Task
+from probdmp.dmp.joint_model import JointExecutions, JointModel, joint_executions
+from probdmp.execution.joint_filtering import start_deviation, state_moments, update_joint
+from probdmp.execution.sensor_array import SensorArray
+from probdmp.gaussian import AugmentedUpdate, Belief, Deviation, predict_deviation
+from probdmp.gaussian.density import log_density_shares
+
+__all__ = ["GainSchedule", "Snapshot", "gain_schedule", "single_execution"]
+
+SNAPSHOT_EVERY = 16
+"""Ticks between those of which all is kept, so that an execution can go on without the schedule."""
+MOST_KEPT_BYTES = 2**29
+"""Of all schedules together that are kept for later executions."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Snapshot:
+    """What is known before the observation of a tick, but for what readings say."""
+
+    covariance: FloatArray
+    """Of z, (r, r) array."""
+    deviation: Deviation
+    """Its offset is of no use."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GainSchedule:
+    """Gains for T ticks; P parameters and 3 S states of all signals, O outputs."""
+
+    rows: FloatArray
+    """(T + 1, 3, N + 3) array: the states of a signal as functions of its parameters; there is one more than ticks."""
+    transition: FloatArray
+    """A of what deviates, (3, 3) array."""
+    gains: FloatArray
+    """K, (T, P + 3 S + r, O) array; 0 for what is not seen."""
+    sensors: FloatArray
+    """C, (O, 3 S) array."""
+    fused: BoolArray
+    """(T, O) array."""
+    innovation_covariances: FloatArray
+    """S, (T, O, O) array."""
+    precisions: FloatArray
+    """S^-1 of what is seen, (T, O, O) array; 1 in the diagonal for what is not."""
+    share_constants: FloatArray
+    """(T, O) array, nats: the part of each output's share in the log-likelihood that readings have no part in."""
+    filtered: FloatArray
+    """(T, S, 3, 3) array: covariances of the states after each update."""
+    predicted: FloatArray
+    """(T, S, 3, 3) array: of the states one tick later."""
+    snapshots: tuple[Snapshot, ...]
+    """Before the ticks 0, SNAPSHOT_EVERY, …, and after the last."""
+
+    @property
+    def n_bytes(self) -> int:
+        """About how much memory it takes."""
+        kept = sum(s.covariance.nbytes + s.deviation.loading.nbytes for s in self.snapshots)
+        return kept + self.gains.nbytes + self.rows.nbytes + self.filtered.nbytes + self.predicted.nbytes
+
+
+def single_execution(executions: JointExecutions) -> tuple[JointModel, FloatArray]:
+    """The model of the first of a batch, without the batch axis, and its rows (T, 3, N + 3)."""
+    model, rows, _ = executions
+    belief = Belief(model.belief.mean[0], model.belief.covariance[0])
+    return JointModel(model.means[0], model.factors[0], belief), rows[:, 0]
+
+
+def gain_schedule(primitive: Primitive, task: Task, dt: float, array: SensorArray, seen: BoolArray) -> GainSchedule:
+    """The gains of executions like one; those computed last are kept.
+
+    Parameters
+    ----------
+    task : a batch of one: only its duration and what is told of it count.
+    array : sensors whose readings say the same whatever is believed: linear ones, without gates.
+    seen : (T, O) array, what is measured when.
+    """
+    told = [np.isnan(part).tobytes() for part in (task.start, task.goal, task.start_velocity) if part is not None]
+    sensors = (array.dense_matrix.tobytes(), array.covariance.tobytes(), array.silent.tobytes())
+    key = (primitive.identity, float(task.duration[0]), dt, *told, *sensors, seen.shape, seen.tobytes())
+    with _LOCK:
+        if key in _KEPT:
+            _KEPT.move_to_end(key)
+            return _KEPT[key]
+    schedule = _computed(primitive, task, dt, array, seen)
+    with _LOCK:
+        _KEPT[key] = schedule
+        while len(_KEPT) > 1 and sum(kept.n_bytes for kept in _KEPT.values()) > MOST_KEPT_BYTES:
+            _KEPT.popitem(last=False)
+    return schedule
+
+
+_KEPT: OrderedDict[tuple[object, ...], GainSchedule] = OrderedDict()
+_LOCK = Lock()
+
+
+def _computed(primitive: Primitive, task: Task, dt: float, array: SensorArray, seen: BoolArray) -> GainSchedule:
+    n_ticks, n_outputs = seen.shape
+    executions = joint_executions(primitive, task, np.array([dt]), n_ticks + 1)
+    model, rows = single_execution(executions)
+    transition, noise = (part[0] for part in executions.system.grouped(array.is_coupled))
+    deviation = start_deviation(model, array.is_coupled)
+    factors, r = model.factors, model.factors.shape[-1]
+    n_states = 3 * len(factors)
+    gains = np.zeros((n_ticks, factors.shape[0] * factors.shape[1] + n_states + r, n_outputs))
+    spreads = np.empty((n_ticks, n_outputs, n_outputs))
+    fused = np.empty((n_ticks, n_outputs), dtype=np.bool_)
+    filtered, predicted = np.empty((2, n_ticks, len(factors), 3, 3))
+    snapshots = []
+    for t, readings in enumerate(np.where(seen, 0.0, np.nan)):
+        if t % SNAPSHOT_EVERY == 0:
+            snapshots.append(Snapshot(model.belief.covariance, deviation))
+        update = update_joint(model, deviation, rows[t], readings, array)
+        gains[t] = _gains(update, array, factors)
+        fused[t] = array.flat(update.seen.fused)
+        spreads[t] = array.flat_covariances(update.seen.innovation_covariance)
+        model = model._replace(belief=update.seen.belief)
+        filtered[t] = state_moments(model, update.deviation, rows[t])[1]
+        deviation = predict_deviation(update.deviation, transition, noise)
+        predicted[t] = state_moments(model, deviation, rows[t + 1])[1]
+    snapshots.append(Snapshot(model.belief.covariance, deviation))
+    both = fused[:, :, None] & fused[:, None, :]
+    known, nothing = np.where(both, spreads, np.eye(n_outputs)), np.zeros((n_ticks, n_outputs))
+    constants = log_density_shares(nothing, nothing, known, np.linalg.cholesky(known), fused)
+    densities = (spreads, np.linalg.inv(known), constants)
+    own = executions.system.transition[0, 0]
+    return GainSchedule(rows, own, gains, array.dense_matrix, fused, *densities, filtered, predicted, tuple(snapshots))
+
+
+def _gains(update: AugmentedUpdate, array: SensorArray, factors: FloatArray) -> FloatArray:
+    """K of x', d' and z', (P + 3 S + r, O)."""
+    n_groups, n, size = update.gains.shape
+    of_z = update.seen.gain @ update.seen.whitening
+    own = np.zeros((n_groups, n, n_groups, size))
+    own[np.arange(n_groups), :, np.arange(n_groups)] = update.gains
+    r = factors.shape[-1]
+    of_deviations = own.reshape(n_groups * n, -1) + update.deviation.loading.reshape(-1, r) @ of_z
+    return array.flat(np.concatenate([factors.reshape(-1, r) @ of_z, of_deviations, of_z]))

@@ -1,0 +1,251 @@
+"""The compiled kernels and their NumPy twins: the same numbers, whatever the systems, and the same refusals.
+
+The twin is the plain statement of what is computed; where there is no extension these laws cannot be asked and are skipped.
+"""
+
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from probdmp.gaussian import _kernels_numpy, kernels
+
+needs_extension = pytest.mark.skipif(not kernels.COMPILED, reason="probdmp.gaussian._kernels was not built, or is not wanted")
+
+# What nobody decides in a hurry: times from none to 2000, systems from 1 to 30, noise over ten orders of magnitude.
+seeds = st.integers(0, 2**32 - 1)
+magnitudes = st.sampled_from([1e-10, 1e-6, 1e-2, 1.0, 1e2])
+
+
+@dataclass
+class Case:
+    """M systems of n states over T times."""
+
+    transition: np.ndarray
+    input_vector: np.ndarray
+    drifts: np.ndarray
+    input_variances: np.ndarray
+    sensor: np.ndarray
+    noise: np.ndarray
+    initial_mean: np.ndarray
+    initial_covariance: np.ndarray
+    observations: np.ndarray
+
+    def arguments(self):
+        return tuple(vars(self).values())
+
+
+@st.composite
+def cases(draw, longest=60):
+    rng = np.random.default_rng(draw(seeds))
+    t, m, n = draw(st.integers(1, longest)), draw(st.integers(1, 30)), draw(st.integers(1, kernels.MOST_STATES))
+    q, r, missing = draw(magnitudes), draw(magnitudes), draw(st.sampled_from([0.0, 0.0, 0.1, 0.7, 1.0]))
+    transition = rng.normal(size=(m, n, n))
+    transition *= 0.95 / np.linalg.norm(transition, axis=(1, 2), keepdims=True)  # it must not explode in 2000 steps
+    root = rng.normal(size=(m, n, n))
+    observations = rng.normal(size=(t, m))
+    observations[rng.random((t, m)) < missing] = np.nan
+    return Case(
+        transition,
+        rng.normal(size=(m, n)),
+        rng.normal(size=(t - 1, m, n)),
+        q * rng.random((t - 1, m)),
+        rng.normal(size=(m, n)),
+        r * (0.5 + rng.random(m)),
+        rng.normal(size=(m, n)),
+        draw(st.sampled_from([0.0, 1.0])) * root @ root.mT,
+        observations,
+    )
+
+
+def filtered(module, case):
+    t, (m, n) = len(case.observations), case.sensor.shape
+    found = [np.full(shape, -7.0) for shape in ((t, m, n), (t, m, n, n), (t, m), (t, m), (t, m), (t, m, n))]
+    module.filter_systems(*case.arguments(), *found)
+    return found
+
+
+def assert_same(first, second, tolerance=1e-12):
+    """To 1e-12 of how large the numbers are, NaN where NaN."""
+    np.testing.assert_array_equal(np.isnan(first), np.isnan(second))
+    size = max(1.0, float(np.nanmax(np.abs(second), initial=0.0)))
+    np.testing.assert_allclose(first, second, rtol=tolerance, atol=tolerance * size)
+
+
+def assert_filtered_alike(case):
+    """An update by a sensor k times as precise as what is known before loses a factor of k to rounding, in whatever order."""
+    compiled, plain = filtered(_compiled(), case), filtered(_kernels_numpy, case)
+    k = float(np.max(plain[3] / case.noise))
+    for ours, theirs in zip(compiled, plain, strict=True):
+        assert_same(ours, theirs, max(1e-12, 1e-14 * k))
+
+
+@needs_extension
+@given(cases())
+def test_systems_are_filtered_alike(case):
+    assert_filtered_alike(case)
+
+
+@needs_extension
+@pytest.mark.slow
+@given(cases(longest=2000))
+@settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow])
+def test_long_systems_are_filtered_alike(case):
+    assert_filtered_alike(case)
+
+
+@needs_extension
+@pytest.mark.parametrize("n_steps", [1, 2, 2000])
+def test_shortest_and_longest_are_filtered_alike(n_steps):
+    rng = np.random.default_rng(n_steps)
+    case = Case(
+        np.tile([[0.0, -25.0, -156.0], [0.0, 0.875, -0.78], [0.0, 0.0044, 0.9961]], (30, 1, 1)),
+        np.tile([1.0, 0.005, 0.000025], (30, 1)),
+        rng.normal(size=(n_steps - 1, 30, 3)),
+        10.0 ** rng.uniform(-12, 2, (n_steps - 1, 30)),
+        np.tile([0.0, 0.0, 1.0], (30, 1)),
+        10.0 ** rng.uniform(-12, 2, 30),
+        np.zeros((30, 3)),
+        np.zeros((30, 3, 3)),
+        np.where(rng.random((n_steps, 30)) < 0.05, np.nan, rng.normal(size=(n_steps, 30))),
+    )
+    assert_filtered_alike(case)
+
+
+@st.composite
+def ticks(draw):
+    """System, inputs, observation and record of D degrees of freedom, as `filter_step` takes them."""
+    rng = np.random.default_rng(draw(seeds))
+    d, n = draw(st.integers(1, 30)), draw(st.integers(1, kernels.MOST_STATES))
+    width = -(-d // kernels.LANE) * kernels.LANE
+    system, inputs = rng.normal(size=(n * n + 2 * n + 1, width)), rng.normal(size=(n + 1, width))
+    system[-1], inputs[-1] = draw(magnitudes) * (1 + rng.random(width)), draw(magnitudes) * rng.random(width)
+    before = rng.normal(size=(n + n * n + 3, width))
+    root = rng.normal(size=(width, n, n))
+    before[n : n + n * n] = (root @ root.mT).reshape(width, -1).T
+    observation = rng.normal(size=d)
+    observation[rng.random(d) < draw(st.sampled_from([0.0, 0.3, 1.0]))] = np.nan
+    return system, inputs, observation, before
+
+
+@needs_extension
+@given(ticks())
+def test_a_tick_is_the_same(arguments):
+    after, expected = np.empty((2, *arguments[-1].shape))
+    seen = _compiled().filter_step(*arguments, after)
+    assert seen == _kernels_numpy.filter_step(*arguments, expected) == int(np.sum(~np.isnan(arguments[2])))
+    d = len(arguments[2])
+    for ours, plain in zip(after[:, :d], expected[:, :d], strict=True):
+        assert_same(ours, plain)
+
+
+@pytest.mark.parametrize("module", ["compiled", "plain"])
+@pytest.mark.parametrize("value", [np.inf, -np.inf, 1e101])
+def test_what_cannot_be_squared_is_refused_before_anything_is_written(module, value):
+    if module == "compiled" and not kernels.COMPILED:
+        pytest.skip("probdmp.gaussian._kernels was not built, or is not wanted")
+    chosen = _compiled() if module == "compiled" else _kernels_numpy
+    n, width = 3, kernels.LANE
+    after = np.full((n + n * n + 3, width), -7.0)
+    system, inputs = np.ones((n * n + 2 * n + 1, width)), np.ones((n + 1, width))
+    assert chosen.filter_step(system, inputs, np.array([0.0, value]), np.ones_like(after), after) == -1
+    assert np.all(after == -7.0)
+
+
+@st.composite
+def series(draw):
+    """Closed loop, feedback, sensor, precisions, observations and paths of N series, as the kernels take them."""
+    rng = np.random.default_rng(draw(seeds))
+    n_series, t = draw(st.integers(0, 20)), draw(st.integers(1, 80))
+    d, n = draw(st.integers(1, 30)), draw(st.integers(1, kernels.MOST_STATES))
+    closed = rng.normal(size=(t, d, n, n))
+    closed *= 0.9 / np.linalg.norm(closed, axis=(2, 3), keepdims=True)
+    observations = rng.normal(size=(n_series, t, d))
+    if draw(st.booleans()):
+        observations[rng.random((n_series, t, d)) < 0.01] = np.nan
+    paths = rng.normal(size=(draw(st.sampled_from([1, n_series])) if n_series else 1, t, d))
+    precisions = draw(magnitudes) * (1 + rng.random((t, d)))
+    return closed, rng.normal(size=(t, d, n)), rng.normal(size=(d, n)), precisions, observations, paths
+
+
+@needs_extension
+@given(series())
+def test_innovations_are_squared_alike(arguments):
+    observations = arguments[4]
+    ours, plain = np.empty((2, len(observations), observations.shape[2]))
+    _compiled().squared_innovations(*arguments, ours)
+    _kernels_numpy.squared_innovations(*arguments, plain)
+    assert_same(ours, plain)
+
+
+@needs_extension
+@given(series(), seeds)
+def test_series_are_smoothed_alike(arguments, seed):
+    closed, observations = arguments[0], np.nan_to_num(arguments[4])
+    arguments = (*arguments[:4], observations, arguments[5])
+    t, d, n = closed.shape[:3]
+    rng = np.random.default_rng(seed)
+    covariances, states = rng.normal(size=(t, d, n, n)), rng.normal(size=(t, d, n))
+    ours, plain = np.empty((2, len(observations), t, d, n))
+    _compiled().smoothed_states(*arguments, covariances, states, ours)
+    _kernels_numpy.smoothed_states(*arguments, covariances, states, plain)
+    assert_same(ours, plain)
+
+
+@needs_extension
+@pytest.mark.parametrize("fault", ["dtype", "axes", "shape", "order", "count", "object", "read-only"])
+def test_arrays_that_do_not_fit_are_refused(fault):
+    t, d, n = 5, 2, 3
+    arguments = [
+        np.zeros((t, d, n, n)),
+        np.zeros((t, d, n)),
+        np.zeros((d, n)),
+        np.zeros((t, d)),
+        np.zeros((4, t, d)),
+        np.zeros((1, t, d)),
+        np.zeros((4, d)),
+    ]
+    _compiled().squared_innovations(*arguments)
+    if fault == "dtype":
+        arguments[4] = arguments[4].astype(np.float32)
+    elif fault == "axes":
+        arguments[4] = arguments[4][0]
+    elif fault == "shape":
+        arguments[1] = np.zeros((t + 1, d, n))
+    elif fault == "order":
+        arguments[4] = np.asfortranarray(arguments[4])
+    elif fault == "count":
+        arguments.pop()
+    elif fault == "object":
+        arguments[0] = None
+    else:
+        arguments[6].flags.writeable = False
+    with pytest.raises((TypeError, ValueError, BufferError)):
+        _compiled().squared_innovations(*arguments)
+
+
+@pytest.mark.parametrize("wanted", ["", "0", "1"])
+def test_the_environment_chooses(wanted):
+    code = "from probdmp.gaussian import kernels; print(kernels.COMPILED)"
+    environment = {**os.environ, "PROBDMP_NO_EXTENSION": wanted}
+    shown = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True).stdout
+    assert shown.strip() == ("False" if wanted == "1" else str(_is_built()))
+
+
+def _compiled():
+    from probdmp.gaussian import _kernels
+
+    return _kernels
+
+
+def _is_built():
+    try:
+        _compiled()
+    except ImportError:
+        return False
+    return True
