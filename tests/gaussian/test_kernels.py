@@ -130,15 +130,15 @@ def ticks(draw):
     before[n : n + n * n] = (root @ root.mT).reshape(width, -1).T
     observation = rng.normal(size=d)
     observation[rng.random(d) < draw(st.sampled_from([0.0, 0.3, 1.0]))] = np.nan
-    return system, inputs, observation, before
+    return system, inputs[None], observation, before
 
 
 @needs_extension
 @given(ticks())
 def test_a_tick_is_the_same(arguments):
     after, expected = np.empty((2, *arguments[-1].shape))
-    seen = _compiled().filter_step(*arguments, after)
-    assert seen == _kernels_numpy.filter_step(*arguments, expected) == int(np.sum(~np.isnan(arguments[2])))
+    seen = _compiled().filter_step(*arguments, after, 0)
+    assert seen == _kernels_numpy.filter_step(*arguments, expected, 0) == int(np.sum(~np.isnan(arguments[2])))
     d = len(arguments[2])
     for ours, plain in zip(after[:, :d], expected[:, :d], strict=True):
         assert_same(ours, plain)
@@ -152,8 +152,8 @@ def test_what_cannot_be_squared_is_refused_before_anything_is_written(module, va
     chosen = _compiled() if module == "compiled" else _kernels_numpy
     n, width = 3, kernels.LANE
     after = np.full((n + n * n + 3, width), -7.0)
-    system, inputs = np.ones((n * n + 2 * n + 1, width)), np.ones((n + 1, width))
-    assert chosen.filter_step(system, inputs, np.array([0.0, value]), np.ones_like(after), after) == -1
+    system, inputs = np.ones((n * n + 2 * n + 1, width)), np.ones((2, n + 1, width))
+    assert chosen.filter_step(system, inputs, np.array([0.0, value]), np.ones_like(after), after, 1) == -1
     assert np.all(after == -7.0)
 
 

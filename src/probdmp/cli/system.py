@@ -15,6 +15,11 @@ REQUIRED = ("numpy", "scipy", "safetensors", "typer", "rich")
 EXTRAS = {"plot": ("matplotlib",)}
 """By extra: the packages that it brings."""
 RECORDINGS = "PROBDMP_RECORDINGS"
+KERNELS = {
+    "compiled": "compiled",
+    "switched off": "NumPy: PROBDMP_NO_EXTENSION is set",
+    "not built": "NumPy: no compiler was found at installation; slower, but all there",
+}
 THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
 
 
@@ -28,6 +33,7 @@ def system_summary() -> dict[str, Any]:
         "platform": platform.platform(),
         "packages": {name: _version(name) for name in REQUIRED},
         "extras": {extra: {name: _version(name) for name in names} for extra, names in EXTRAS.items()},
+        "kernels": _kernels(),
         "blas": _blas(),
         "threads": {name: os.environ[name] for name in THREADS if name in os.environ},
         "processors": os.cpu_count(),
@@ -45,6 +51,7 @@ def print_system(summary: dict[str, Any]) -> None:
         command = f"missing: pip install 'probdmp[{extra}]'"
         rows += [[f"{name} (extra {extra})", found or command] for name, found in packages.items()]
     threads = ", ".join(f"{name}={value}" for name, value in summary["threads"].items())
+    rows.append(["kernels", KERNELS[summary["kernels"]]])
     rows.append(["BLAS", summary["blas"] + (f", {threads}" if threads else "")])
     rows.append(["processors", f"{summary['processors_allowed']} of {summary['processors']}"])
     where = "not set: real recordings are for the tests alone" if summary["recordings"] is None else summary["recordings"]
@@ -60,6 +67,15 @@ def _version(name: str) -> str | None:
         return version(name)
     except PackageNotFoundError:
         return None
+
+
+def _kernels() -> str:
+    """What filters executions: a name from `KERNELS`."""
+    from probdmp.gaussian import kernels
+
+    if kernels.COMPILED:
+        return "compiled"
+    return "switched off" if kernels.SWITCHED_OFF else "not built"
 
 
 def _blas() -> str:

@@ -23,9 +23,12 @@ from probdmp.execution import (
     TrackedTrajectory,
     estimate_sensor_noise,
     feedback_gains,
+    is_batch,
+    own_batch,
     roll_out,
     sample_recordings,
     sample_trajectories,
+    score_batch,
     score_recordings,
     smooth_recording,
     task_of_recording,
@@ -243,7 +246,10 @@ class ProbabilisticDMP(HasPrimitive):
         ----------
         tasks : what each was asked to do; its own first row and length and the learned goal unless given.
         """
-        primitive, recordings = self._learned(), as_demonstrations(executions, self._step(dt))
+        primitive = self._learned()
+        if tasks is None and sensors is None and is_batch(executions, primitive):
+            return score_batch(primitive, own_batch(primitive, executions, self._step(dt)))
+        recordings = as_demonstrations(executions, self._step(dt))
         asked = tasks if tasks is not None else [task_of_recording(primitive, recording) for recording in recordings]
         return score_recordings(primitive, asked, recordings, self._array(sensors))
 

@@ -1,6 +1,6 @@
 """Running a primitive: rollout, tracking, smoothing and sampling of recordings, online execution."""
 
-from probdmp.execution.execution_batch import ExecutionBatch
+from probdmp.execution.execution_batch import ExecutionBatch, is_batch, own_batch
 from probdmp.execution.execution_step import ExecutionStep, Judgement
 from probdmp.execution.feedback_gains import feedback_gains
 from probdmp.execution.online import Monitor, Observed, OnlineExecution
@@ -47,6 +47,8 @@ __all__ = [
     "estimate_sensor_noise",
     "feedback_gains",
     "filter_recordings",
+    "is_batch",
+    "own_batch",
     "planar_arm_sensor",
     "position_covariances",
     "readings_of",

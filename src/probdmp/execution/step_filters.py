@@ -64,7 +64,7 @@ class PlainFilter:
             self._load(LATER_CHUNK)
             k = 0
         record = np.empty(self._record.shape)
-        n_fused = kernels.filter_step(self._system, self._inputs[k], observation, self._record, record)
+        n_fused = kernels.filter_step(self._system, self._inputs, observation, self._record, record, k)
         if n_fused < 0:
             check_array(observation, "observation", observation.shape, missing=True)
         self._record, self._step = record, self._step + 1
@@ -78,7 +78,7 @@ class PlainFilter:
         self._system = _padded(np.concatenate([transition, s.input_vector, s.sensor, s.noise[:, None]], axis=1).T)
         self._system[-1, len(s.noise) :] = 1.0  # noise of nothing, which is divided by
         inputs = np.concatenate([s.drifts, s.input_variances[..., None]], axis=-1)
-        self._inputs = list(_padded(inputs.swapaxes(1, 2)))
+        self._inputs = _padded(inputs.swapaxes(1, 2))
 
 
 def _padded(rows: FloatArray) -> FloatArray:

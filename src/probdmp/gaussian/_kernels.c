@@ -219,21 +219,35 @@ static PyObject *filter_systems(PyObject *module, PyObject *const *arguments, Py
 static PyObject *filter_step(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
 {
     static const Spec specs[] = {
-        {"system", 0, 2}, {"inputs", 0, 2}, {"observation", 0, 1}, {"before", 0, 2}, {"after", 1, 2},
+        {"system", 0, 2}, {"inputs", 0, 3}, {"observation", 0, 1}, {"before", 0, 2}, {"after", 1, 2},
     };
     enum { COUNT = sizeof(specs) / sizeof(specs[0]) };
     Array x[COUNT];
-    if (take(arguments, given, specs, COUNT, x) < 0) return NULL;
-    const Py_ssize_t d = x[2].view.shape[0], stride = x[4].view.shape[1], n = x[1].view.shape[0] - 1;
+    if (given != COUNT + 1) {
+        PyErr_Format(PyExc_TypeError, "expected %d arrays and a number, got %zd arguments", COUNT, given);
+        return NULL;
+    }
+    const Py_ssize_t step = PyLong_AsSsize_t(arguments[COUNT]);
+    if (step == -1 && PyErr_Occurred()) return NULL;
+    if (take(arguments, COUNT, specs, COUNT, x) < 0) return NULL;
+    const Py_ssize_t d = x[2].view.shape[0], stride = x[4].view.shape[1], steps = x[1].view.shape[0];
+    const Py_ssize_t n = x[1].view.shape[1] - 1;
     Py_ssize_t n_seen = 0;
     int fits = few_states(n) && agree(&x[0], "system", n * n + 2 * n + 1, stride, 0, 0)
-               && agree(&x[1], "inputs", n + 1, stride, 0, 0) && agree(&x[3], "before", n * n + n + 3, stride, 0, 0)
+               && agree(&x[1], "inputs", steps, n + 1, stride, 0) && agree(&x[3], "before", n * n + n + 3, stride, 0, 0)
                && agree(&x[4], "after", n * n + n + 3, stride, 0, 0);
     if (fits && (stride % WIDTH || d > stride || d <= stride - WIDTH)) {
         PyErr_Format(PyExc_ValueError, "expected rows padded from %zd to a multiple of %d, got %zd", d, WIDTH, stride);
         fits = 0;
     }
-    if (fits) n_seen = CHOOSE(step_all)((int)n, d, stride, x[0].data, x[1].data, x[2].data, x[3].data, x[4].data);
+    if (fits && (step < 0 || step >= steps)) {
+        PyErr_Format(PyExc_ValueError, "expected a step of %zd, got %zd", steps, step);
+        fits = 0;
+    }
+    if (fits) {
+        const double *now = x[1].data + step * (n + 1) * stride;
+        n_seen = CHOOSE(step_all)((int)n, d, stride, x[0].data, now, x[2].data, x[3].data, x[4].data);
+    }
     release(x, COUNT);
     return fits ? PyLong_FromSsize_t(n_seen) : NULL;
 }

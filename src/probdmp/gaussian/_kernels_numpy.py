@@ -55,16 +55,19 @@ def filter_systems(
         means[t], covariances[t] = mean, covariance
 
 
-def filter_step(system: FloatArray, inputs: FloatArray, observation: FloatArray, before: FloatArray, after: FloatArray) -> int:
+def filter_step(
+    system: FloatArray, inputs: FloatArray, observation: FloatArray, before: FloatArray, after: FloatArray, step: int
+) -> int:
     """One tick of D systems: update with what was observed, then predict. Each number of theirs has a row of length W >= D.
 
     Parameters
     ----------
     system : (n n + 2 n + 1, W) array, rows A, b, c, r.
-    inputs : (n + 1, W) array, drift and input variance of the step that follows.
+    inputs : (T, n + 1, W) array, drift and input variance of each step.
     observation : (D,) array.
     before : (n + n n + 3, W) array, the record whose first rows are m and V of the state as predicted.
     after : written, likewise: m and V of the next tick, then innovation, its variance S and log-likelihood of this one.
+    step : which of the inputs drives the step that follows.
 
     Returns
     -------
@@ -72,6 +75,7 @@ def filter_step(system: FloatArray, inputs: FloatArray, observation: FloatArray,
     """
     if np.any(np.abs(observation) > LARGEST_MAGNITUDE):
         return -1
+    inputs = inputs[step]
     n, width = len(inputs) - 1, inputs.shape[1]
     a, (b, c, r) = system[: n * n].T.reshape(width, n, n), np.split(system[n * n :].T, [n, 2 * n], axis=1)
     observed = np.zeros(width)

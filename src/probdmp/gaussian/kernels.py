@@ -23,8 +23,12 @@ __all__ = [
 ]
 
 
+SWITCHED_OFF = os.environ.get("PROBDMP_NO_EXTENSION", "0") not in ("", "0")
+"""Whether the environment asks for the twins."""
+
+
 def _chosen() -> ModuleType:
-    if os.environ.get("PROBDMP_NO_EXTENSION", "0") not in ("", "0"):
+    if SWITCHED_OFF:
         return _kernels_numpy
     try:
         from probdmp.gaussian import _kernels  # type: ignore[attr-defined]
