@@ -12,6 +12,7 @@ from probdmp.checks import FloatArray, IntArray
 from probdmp.demonstrations import Demonstration
 from probdmp.dmp import Primitive, Task, linear_gaussian_model, stack_tasks, unstack_tasks
 from probdmp.dmp.joint_model import joint_executions
+from probdmp.errors import InputError
 from probdmp.execution.execution_batch import ExecutionBatch
 from probdmp.execution.gain_schedule import gain_schedule
 from probdmp.execution.independent_filtering import sensed_system
@@ -48,6 +49,11 @@ def score_recordings(
 def score_batch(primitive: Primitive, batch: ExecutionBatch, sensors: SensorArray | None = None) -> FloatArray:
     """Total log-likelihood of each execution given its task, (N,) array, nats."""
     array = SensorArray(primitive) if sensors is None else sensors
+    if batch.observations.shape[2] != len(array.outputs):
+        raise InputError(
+            f"executions of {len(array.outputs)} outputs of sensors ({', '.join(array.outputs)})",
+            f"{batch.observations.shape[2]}",
+        )
     score, scores = _score_for(primitive, array), np.full(len(batch), np.nan)
     if score is not None:
         for members in _alike(batch):
