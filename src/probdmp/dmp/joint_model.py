@@ -10,11 +10,12 @@ What is told of an execution, its goal or its start velocity, is told of rows[t]
 `probdmp.gaussian.augmented`; F has no more columns than x has independent directions.
 """
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
-from probdmp.checks import FloatArray
+from probdmp.checks import FloatArray, frozen
 from probdmp.dmp.deviations import DeviationSystem, deviation_system, lasting_variances
 from probdmp.dmp.goal_handling import conditioned_part
 from probdmp.dmp.path_distribution import parameter_factor, signal_distribution
@@ -159,8 +160,9 @@ def mean_positions(executions: JointExecutions) -> FloatArray:
     return np.asarray(np.einsum("tkn,kdn->tkd", positions, means))
 
 
+@lru_cache(maxsize=64)
 def _start_and_parameters(primitive: Primitive) -> tuple[FloatArray, FloatArray]:
-    """Mean of x, (S, N + 3), and F, (S, N + 3, r), of executions whose start is not known."""
+    """Mean of x, (S, N + 3), and F, (S, N + 3, r), of executions whose start is not known; kept, as they are read-only."""
     d, n = primitive.n_dof, primitive.configuration.n_basis + 3
     mean, parameters = signal_distribution(primitive)
     mean[:d, START] = primitive.start
@@ -168,7 +170,7 @@ def _start_and_parameters(primitive: Primitive) -> tuple[FloatArray, FloatArray]
     covariance[own, START, own, START] = primitive.start_covariances[:, 1, 1]
     covariance[own, START, own, START_VELOCITY + 1] = primitive.start_covariances[:, 0, 1]
     covariance[own, START_VELOCITY + 1, own, START] = primitive.start_covariances[:, 0, 1]
-    return mean, parameter_factor(parameters).reshape(len(mean), n, -1)
+    return frozen(mean), frozen(parameter_factor(parameters).reshape(len(mean), n, -1))
 
 
 def _told(

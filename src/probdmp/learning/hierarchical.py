@@ -179,19 +179,20 @@ def _posteriors(problem: _Problem, mean: FloatArray, covariance: FloatArray, res
     residuals : R, (S,), in units of the range squared, as all else.
     """
     designs, paths, has_goal, goal = problem
-    (k, _, n_signals), n = paths.shape, designs.shape[1]
-    row = np.eye(n)[goal]
-    # Sigma = F F^T: in terms of F no parameter is larger than another, and none needs to vary.
-    eigenvalues, vectors = np.linalg.eigh(covariance)
-    factor = vectors * np.sqrt(np.maximum(eigenvalues, 0.0))
-    information = np.kron(np.diag(1 / residuals), designs.T @ designs)
-    information += np.kron(np.diag(has_goal), np.outer(row, row)) / GOAL_TOLERANCE**2
-    errors = paths - designs @ mean.reshape(n_signals, n).T[None]
-    scores = np.einsum("kmd,mn->kdn", errors / residuals, designs)
-    scores[..., goal] += has_goal * (paths[:, -1] - mean.reshape(n_signals, n)[:, goal]) / GOAL_TOLERANCE**2
-    precision = np.eye(len(mean)) + factor.T @ information @ factor
-    gain = factor @ np.linalg.solve(precision, factor.T)
-    return _Posteriors(mean + scores.reshape(k, -1) @ gain.T, (gain + gain.T) / 2)
+    (k, m, n_signals), n = paths.shape, designs.shape[1]
+    # What is seen of the parameters of each signal, with unit noise: Q U theta + e. U^T U is the information.
+    rows = np.concatenate([np.tile(designs, (n_signals, 1, 1)), np.tile(np.eye(n)[goal], (n_signals, 1, 1))], axis=1)
+    weights = np.concatenate([np.tile(residuals**-0.5, (m, 1)), has_goal[None] / GOAL_TOLERANCE])
+    orthogonal, roots = np.linalg.qr(rows * weights.T[..., None])
+    seen = np.concatenate([paths, paths[:, -1:]], axis=1) - (rows @ mean.reshape(n_signals, n, 1))[..., 0].T
+    told = np.moveaxis(np.matmul((seen * weights).transpose(2, 0, 1), orthogonal), 0, 1).reshape(k, -1)
+    # C = Sigma - Sigma U^T (1 + U Sigma U^T)^-1 U Sigma: Sigma may be singular, and no parameter needs to vary.
+    spread = np.matmul(covariance.reshape(-1, n_signals, 1, n), roots.mT[None])[..., 0, :].reshape(len(mean), -1)
+    size = spread.shape[1]
+    inner = np.eye(size) + np.matmul(roots, spread.reshape(n_signals, n, -1)).reshape(size, -1)
+    solved = np.linalg.solve(inner, np.concatenate([spread.T, told.T], axis=1))
+    posterior = covariance - spread @ solved[:, : len(mean)]
+    return _Posteriors(mean + (spread @ solved[:, len(mean) :]).T, (posterior + posterior.T) / 2)
 
 
 def _residual_variances(problem: _Problem, posteriors: _Posteriors) -> FloatArray:

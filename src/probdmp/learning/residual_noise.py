@@ -22,6 +22,7 @@ from probdmp.dmp import Primitive, Task
 from probdmp.dmp.deviations import DeviationSystem, deviation_system, lasting_variances
 from probdmp.dmp.joint_model import JointExecutions, joint_executions
 from probdmp.dmp.transformation_system import POSITION, VELOCITY
+from probdmp.gaussian import kernels
 
 __all__ = ["with_residual_noise"]
 
@@ -113,9 +114,8 @@ def _likelihoods(residuals: _Residuals, system: DeviationSystem, variances: Floa
     shared = _Gains(*(x[: len(spreads), ..., [typical]] for x in gains))
     moves = system.transition[:, 0, VELOCITY:, VELOCITY:]
     squares = _squared_innovations(np.where(counted, errors, 0.0), counted[:, None] / gains.variances, gains, moves)
-    spread_squares = _squared_innovations(spreads, 1 / shared.variances, shared, moves[[typical]])
     n = counted[:, 0].sum()
-    per_time = spread_squares.sum(axis=-1) / (len(spreads) - 1)
+    per_time = _squared_spreads(spreads, shared, moves[typical]) / (len(spreads) - 1)
     scales = squares.sum(axis=-1) / n + per_time
     logs = np.sum(counted[:, None] * np.log(gains.variances), axis=(0, -1))
     return -0.5 * (n * np.log(scales) + logs), scales
@@ -166,3 +166,26 @@ def _squared_innovations(paths: FloatArray, weights: FloatArray, gains: _Gains, 
         p = expected + gain_p * innovation
         squares += weight * innovation**2
     return squares
+
+
+def _squared_spreads(spreads: FloatArray, gains: _Gains, move: FloatArray) -> FloatArray:
+    """The same sums of all columns of `spreads`, (T, D, C), which share their gains, (T, G, D or 1, 1): (G, D) array.
+
+    Parameters
+    ----------
+    move : A of velocity and position, (2, 2).
+    """
+    n_times, n_dof, n_columns = spreads.shape
+    series = np.ascontiguousarray(np.moveaxis(spreads[1:], -1, 0))
+    planned, squares = np.zeros((1, n_times - 1, n_dof)), np.empty((n_columns, n_dof))
+    sensor = np.tile([0.0, 1.0], (n_dof, 1))
+    sums = []
+    for g in range(gains.variances.shape[1]):
+        own = np.stack([gains.velocity[1:, g, :, 0], gains.position[1:, g, :, 0]], axis=-1)
+        feedback = np.broadcast_to(own @ move.T, (n_times - 1, n_dof, 2))
+        closed_loop = move - feedback[..., None] * sensor[:, None, :]
+        precisions = np.broadcast_to(1 / gains.variances[1:, g, :, 0], planned.shape[1:])
+        shared = (np.ascontiguousarray(closed_loop), np.ascontiguousarray(feedback), sensor, np.ascontiguousarray(precisions))
+        kernels.squared_innovations(*shared, series, planned, squares)
+        sums.append(squares.sum(axis=0))
+    return np.stack(sums)
