@@ -16,15 +16,17 @@ grows as 1 / sqrt(dt).
 Source: Meier & Schaal 2016, "Deriving the Probabilistic DMP Model".
 """
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
-from probdmp.checks import FloatArray
+from probdmp.checks import FloatArray, frozen
 from probdmp.demonstrations.demonstration import LONGEST_RECORDING
-from probdmp.dmp.forcing_term import forcing_term
+from probdmp.dmp.forcing_term import ForcingTerm, forcing_term
 from probdmp.dmp.phase import phases_at
 from probdmp.dmp.primitive import Primitive
+from probdmp.dmp.responses import held_features
 from probdmp.dmp.task import Task
 from probdmp.dmp.transformation_system import ACCELERATION, DISCRETIZATIONS, spring_matrix
 from probdmp.errors import InputError
@@ -74,9 +76,7 @@ def control_inputs(primitive: Primitive, task: Task, dt: FloatArray | float, ste
     times = steps.reshape(-1, *(1,) * max(dt.ndim, duration.ndim)) * dt
     forcing = forcing_term(primitive, phases_at(times, duration))
     amplitude, configuration = primitive.amplitudes(task), primitive.configuration
-    variance_at = DISCRETIZATIONS[configuration.discretization].noise_variance
-    learned_step = np.asarray(configuration.alpha_z * primitive.phase_step)
-    correction = (variance_at(configuration.alpha_z * dt / duration) / variance_at(learned_step))[..., None]
+    correction = _noise_correction(primitive, dt / duration)
     means = configuration.stiffness * primitive.goals(task) + amplitude * forcing.means
     return ControlInputs(means, amplitude**2 * forcing.variances * correction)
 
@@ -101,11 +101,11 @@ def linear_gaussian_model(
     dt = np.asarray(dt, dtype=np.float64)
     scheme = DISCRETIZATIONS[primitive.configuration.discretization]
     system = scheme.step(primitive.configuration.alpha_z, task.duration, dt)
-    steps = first_step + np.arange(n_steps - 1, dtype=np.float64)
-    means = _held(primitive, task, dt, steps, scheme.forcing_stencil)
-    if first_step == 0:
-        means[:1] = _held(primitive, task, dt, steps[:1], scheme.first_stencil)
-    variances = control_inputs(primitive, task, dt, steps + scheme.noise_offset).variances
+    amplitude, configuration = primitive.amplitudes(task), primitive.configuration
+    held = _held_forcing(primitive, dt / task.duration, n_steps - 1, first_step)
+    correction = _noise_correction(primitive, dt / task.duration)
+    means = configuration.stiffness * primitive.goals(task) + amplitude * held.means
+    variances = amplitude**2 * held.variances * correction
     mean, covariance = _initial_state(primitive, task, control_inputs(primitive, task, dt, np.zeros(1)))
     return LinearGaussianModel(
         transition=system.transition[..., None, :, :],
@@ -119,11 +119,32 @@ def linear_gaussian_model(
     )
 
 
-def _held(
-    primitive: Primitive, task: Task, dt: FloatArray, steps: FloatArray, stencil: tuple[tuple[float, float], ...]
-) -> FloatArray:
-    """The mean input held over steps that begin at `steps`, (n, *batch, D) array, data units."""
-    return np.sum([weight * control_inputs(primitive, task, dt, steps + place).means for place, weight in stencil], axis=0)
+def _held_forcing(primitive: Primitive, phase_steps: FloatArray, n_steps: int, first_step: int) -> ForcingTerm:
+    """The forcing term that is held over each step, (n, *batch, D); batch axes are of length 1 where all steps are alike."""
+    different, where = np.unique(phase_steps, return_inverse=True)
+    alike = [_held_forcing_at(primitive, float(step), n_steps, first_step) for step in different]
+    shape = (n_steps, *(phase_steps.shape if len(alike) > 1 else (1,) * phase_steps.ndim), primitive.n_dof)
+
+    def of_batch(parts: list[FloatArray]) -> FloatArray:
+        return np.stack(parts, axis=1)[:, where.ravel() if len(parts) > 1 else slice(None)].reshape(shape)
+
+    return ForcingTerm(of_batch([part.means for part in alike]), of_batch([part.variances for part in alike]))
+
+
+@lru_cache(maxsize=64)
+def _held_forcing_at(primitive: Primitive, phase_step: float, n_steps: int, first_step: int) -> ForcingTerm:
+    """The same for one dt / T_d, (n, D); kept, as executions often differ in nothing but their start and goal."""
+    offset = DISCRETIZATIONS[primitive.configuration.discretization].noise_offset
+    steps = first_step + np.arange(n_steps, dtype=np.float64) + offset
+    means = held_features(primitive.configuration, phase_step, n_steps, first_step) @ primitive.weight_means.T
+    return ForcingTerm(frozen(means), frozen(forcing_term(primitive, phases_at(steps * phase_step, 1.0)).variances))
+
+
+def _noise_correction(primitive: Primitive, phase_steps: FloatArray) -> FloatArray:
+    """Of the variance of the forcing term, from the step of the training data to others, (*batch, 1) array."""
+    variance_at = DISCRETIZATIONS[primitive.configuration.discretization].noise_variance
+    alpha_z = primitive.configuration.alpha_z
+    return (variance_at(alpha_z * phase_steps) / variance_at(np.asarray(alpha_z * primitive.phase_step)))[..., None]
 
 
 def _initial_state(primitive: Primitive, task: Task, first: ControlInputs) -> tuple[FloatArray, FloatArray]:

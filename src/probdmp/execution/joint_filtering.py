@@ -103,12 +103,17 @@ def smooth_all_joint(
 
 def roll_out_joint(executions: JointExecutions) -> GaussianSequence:
     """All states given what is known before they begin: (T, N, S, 3) and (T, N, S, 3, 3)."""
-    moments, deviation, noise = [], start_deviation(executions.model, False), executions.system.noise
-    for t, rows in enumerate(executions.rows):
-        if t > 0:
-            deviation = predict_deviation(deviation, executions.system.transition, noise)
-        moments.append(state_moments(executions.model, deviation, rows))
-    return GaussianSequence(*(np.stack(m) for m in zip(*moments, strict=True)))
+    (means, factors, (mean, covariance)), rows, system = executions
+    expected = means + np.matmul(factors, mean[:, None, :, None])[..., 0]
+    of_parameters = factors @ covariance[:, None] @ factors.mT  # (N, S, N + 3, N + 3)
+    each = rows[:, :, None]
+    covariances = each @ of_parameters @ each.mT
+    own, noise = np.zeros(covariances.shape[1:]), system.noise
+    for t in range(1, len(rows)):
+        own = system.transition @ own @ system.transition.mT + noise
+        covariances[t] += own
+    states = np.matmul(each, expected[..., None])[..., 0]
+    return GaussianSequence(states, (covariances + covariances.mT) / 2)
 
 
 def joint_position_covariances(executions: JointExecutions) -> FloatArray:
