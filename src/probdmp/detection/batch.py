@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probdmp.checks import BoolArray, FloatArray, IntArray
+from probdmp.detection.judgement import Verdicts
 from probdmp.detection.verdict import Verdict
 
 __all__ = ["BatchJudgement"]
@@ -34,6 +35,31 @@ class BatchJudgement(NamedTuple):
     """(N,) array."""
     has_sensor_fault: BoolArray
     """(N,) array."""
+
+    @classmethod
+    def of_judgement(cls, judgement: Verdicts, names: tuple[str, ...]) -> "BatchJudgement":
+        """From verdicts side by side on executions of which what has these names is watched."""
+        shares = judgement.contributions
+        largest = np.argmax(np.abs(shares), axis=1)
+        signs = np.sign(shares[np.arange(len(shares)), largest]).astype(np.int64)
+        signed = np.array([[f"+{name}", f"−{name}", ""] for name in names])
+        blamed = signed[largest, np.select([signs > 0, signs < 0], [0, 1], 2)]
+        texts = (judgement.kinds, judgement.causes, judgement.channels, judgement.betters)
+        kinds, causes, channels, betters = (np.asarray(text, dtype=np.str_) for text in texts)
+        return cls(
+            judgement.failed,
+            judgement.steps,
+            judgement.times,
+            judgement.phases,
+            judgement.test_ratios,
+            kinds,
+            causes,
+            channels,
+            betters,
+            blamed,
+            judgement.is_stale,
+            judgement.has_sensor_fault,
+        )
 
     @classmethod
     def of(cls, verdicts: list[Verdict]) -> "BatchJudgement":

@@ -55,7 +55,7 @@ class CalibratedMonitor:
         if sensors is not None:
             if sensors.cause and not self._verdict.has_sensor_fault:
                 self._note_sensor(observed, sensors)
-            if sensors.is_stale != self._verdict.is_stale:
+            if bool(sensors.is_stale) != self._verdict.is_stale:
                 self._note_silence(observed, sensors)
         return self._ratio
 
@@ -100,7 +100,7 @@ class CalibratedMonitor:
         if not self._verdict.failed:
             shares = np.zeros(len(self._verdict.names))
             shares[: len(sensors.shares)] = sensors.shares
-            self._latch(observed, sensors.ratio, shares, "sensor")
+            self._latch(observed, float(sensors.ratio), shares, "sensor")
         self._is_latched = True
         verdict = replace(self._verdict, kind="sensor", cause=sensors.cause, better="")
         self._verdict = replace(verdict, failed=True, has_sensor_fault=True)
@@ -108,7 +108,7 @@ class CalibratedMonitor:
     def _note_silence(self, observed: Observed, sensors: SensorWatch) -> None:
         """What is not seen cannot be called fine."""
         if sensors.is_stale and not self._verdict.failed:
-            self._latch(observed, sensors.staleness, np.zeros(len(self._verdict.names)), "silence")
+            self._latch(observed, float(sensors.staleness), np.zeros(len(self._verdict.names)), "silence")
             self._is_latched = True
             self._verdict = replace(self._verdict, failed=True, kind="data missing", cause="nothing measured")
-        self._verdict = replace(self._verdict, is_stale=sensors.is_stale)
+        self._verdict = replace(self._verdict, is_stale=bool(sensors.is_stale))

@@ -17,8 +17,10 @@ from probdmp.detection.calibrated_monitor import CalibratedMonitor
 from probdmp.detection.calibration import Calibration
 from probdmp.detection.calibration_facts import CalibrationFacts, facts_of
 from probdmp.detection.innovation_family import InnovationFamily
+from probdmp.detection.judgement import Standard, Verdicts, joined
 from probdmp.detection.library import Library, Member, own_tasks
 from probdmp.detection.options import DetectorOptions
+from probdmp.detection.recorded_signals import RecordedSignals
 from probdmp.detection.sources import Source
 from probdmp.detection.trajectory_family import TrajectoryFamily, tells_goal
 from probdmp.dmp import Primitive, Task
@@ -98,9 +100,12 @@ class CalibratedRule:
 
     def calibration(self, primitive: Primitive, task: Task) -> Calibration:
         """What is normal for an execution."""
-        by_label = self.calibrations.get(tells_goal(task))
+        return self._calibration(primitive, tells_goal(task))
+
+    def _calibration(self, primitive: Primitive, knows_goal: bool) -> Calibration:
+        by_label = self.calibrations.get(knows_goal)
         if by_label is None:
-            told, other = ("tell", "do not") if tells_goal(task) else ("do not tell", "do")
+            told, other = ("tell", "do not") if knows_goal else ("do not tell", "do")
             raise InputError(
                 f"a detector calibrated on executions that {told} their goal",
                 f"one calibrated on executions that {other}",
@@ -127,6 +132,29 @@ class CalibratedRule:
         """For each recording, a judge and what an execution would have shown it."""
         for task, (source, ticks) in zip(tasks, self.family.replay(primitive, tasks, recordings), strict=True):
             yield self._monitor(primitive, task, source), ticks
+
+    def watched(self, primitive: Primitive) -> tuple[str, ...]:
+        """Names of what is judged."""
+        return self.family.watched(primitive)
+
+    def judge(self, primitive: Primitive, tasks: Task, recorded: Callable[[], RecordedSignals]) -> Verdicts | None:
+        """Verdicts on recordings side by side, where the statistic can do that.
+
+        Parameters
+        ----------
+        tasks : with the batch axis (N).
+        """
+        if not isinstance(self.family, TrajectoryFamily) or not self.family.judges_recordings(primitive):
+            return None
+        told, label = ~np.isnan(tasks.goal).any(axis=1), self._labels[primitive.identity]
+        standards = {}
+        for knows_goal in (True, False):
+            some = np.flatnonzero(told == knows_goal)
+            if len(some):
+                calibration = self._calibration(primitive, knows_goal)
+                threshold = calibration.threshold_for(label)
+                standards[knows_goal] = Standard(calibration, threshold, self.options.persistence, self.family.channels)
+        return joined(self.family.judge(primitive, tasks, standards, recorded()))
 
     def state(self) -> dict[str, Any]:
         """Plain values."""
@@ -175,8 +203,7 @@ class CalibratedRule:
     def _monitor(self, primitive: Primitive, task: Task, source: Source) -> CalibratedMonitor:
         calibration = self.calibration(primitive, task)
         label, channels = self._labels[primitive.identity], self.family.channels
-        watched = self.family.watched(primitive)
-        return CalibratedMonitor(source, calibration, label, channels, watched, self.options.persistence)
+        return CalibratedMonitor(source, calibration, label, channels, self.watched(primitive), self.options.persistence)
 
 
 def _tasks(member: Member, knows_goal: bool) -> list[Task]:

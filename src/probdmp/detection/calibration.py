@@ -131,13 +131,29 @@ class Calibration:
 
     def surprise(self, values: FloatArray) -> FloatArray:
         """-ln of the share of normal executions that ever reach values (…, C), by channel, less its handicap; at least 0."""
-        filled = np.nan_to_num(np.asarray(values, dtype=np.float64))
-        ranks = np.stack(
-            [self.n - np.searchsorted(column, filled[..., c], "left") for c, column in enumerate(self._sorted.T)], axis=-1
-        )
-        by_rank = np.minimum(-np.log((ranks + 1) / (self.n + 1)), self._tail_surprises)
-        tail = np.log(np.maximum(filled, self._starts) / self._starts) / self._exponents
-        return np.maximum(np.where(filled > self._starts, self._tail_surprises + tail, by_rank) - self._handicaps, 0.0)
+        given = np.asarray(values, dtype=np.float64)
+        return np.stack([self.surprise_of(channel, given[..., channel]) for channel in range(given.shape[-1])], axis=-1)
+
+    def surprise_of(self, channel: int, values: FloatArray) -> FloatArray:
+        """The same for values (…) of one channel."""
+        start, tail_surprise = self._starts[channel], self._tail_surprises[channel]
+        filled = np.nan_to_num(values)
+        ranks = self.n - np.searchsorted(self._sorted[:, channel], filled, "left")
+        by_rank = np.minimum(-np.log((ranks + 1) / (self.n + 1)), tail_surprise)
+        tail = np.log(np.maximum(filled, start) / start) / self._exponents[channel]
+        surprises = np.where(filled > start, tail_surprise + tail, by_rank)
+        return np.asarray(np.maximum(surprises - self._handicaps[channel], 0.0))
+
+    def least_values(self, surprises: FloatArray) -> FloatArray:
+        """(…, C) array: values below which no channel can be as surprising as given (…), safely rounded down."""
+        wanted = np.asarray(surprises)[..., None] * (1 - ROUNDING) - ROUNDING + self._handicaps
+        tail = self._starts * np.exp((wanted - self._tail_surprises) * self._exponents) * (1 - ROUNDING)
+        # -ln ((ranks + 1) / (n + 1)) >= wanted
+        ranks = np.floor((self.n + 1) * np.exp(-wanted) * (1 + ROUNDING)).astype(np.int64) - 1
+        places = self.n - 1 - np.clip(ranks, 0, self.n - 1)
+        by_rank = np.take_along_axis(self._sorted, places.reshape(-1, places.shape[-1]), axis=0).reshape(places.shape)
+        least = np.where(wanted > self._tail_surprises, tail, np.minimum(by_rank, self._starts))
+        return np.where(ranks >= self.n, -np.inf, least)
 
     def surprises_now(self, values: FloatArray) -> list[float]:
         """The same for the values (C,) of one moment, fast enough for a control loop."""

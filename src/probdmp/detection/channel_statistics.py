@@ -12,11 +12,12 @@ own statistics to say: only what the channel adds to the distance of both is cou
 
 import numpy as np
 
-from probdmp.checks import BoolArray, FloatArray, IntArray
+from probdmp.checks import FloatArray, IntArray
 from probdmp.detection.path_model import PathModel
 from probdmp.detection.phase_clock import TICKS
 from probdmp.detection.trajectory_statistics import SHIFT_STD
-from probdmp.detection.windows import inverse_of_cholesky
+from probdmp.detection.window_maps import WindowInputs, linear_maps
+from probdmp.detection.windows import inverse_of_cholesky, whitened
 
 __all__ = ["ChannelStatistic"]
 
@@ -53,6 +54,32 @@ class ChannelStatistic:
         noise = np.diag(model.noise_variances[self._chosen % n_signals])
         self._covariances = whole[rows[..., :, None], rows[..., None, :]] + noise
         self._whitening = inverse_of_cholesky(self._covariances)
+        means = model.means.ravel()[rows]
+        gains = model.goal_gains.reshape(model.means.size, -1)[rows]
+        shape, which = (-1, *self._whitening.shape[2:]), np.arange(rows.shape[0] * rows.shape[1]).reshape(rows.shape[:2])
+        self.maps = linear_maps(
+            self._whitening.reshape(shape),
+            means.reshape(-1, means.shape[2]),
+            gains.reshape(-1, *gains.shape[2:]),
+            self._chosen % n_signals,
+            which,
+        )
+        self.seen_at = self.offsets[self._chosen // n_signals]
+        """(E) tick of each of them relative to the one that is judged."""
+
+    def weigh(self, inputs: WindowInputs, length: int) -> FloatArray:
+        """Squared distance per number at the first ticks, (length, n) array, of executions of which nothing is unseen."""
+        ends = np.array([self._n_movement, len(self._chosen)])
+        of_movement, of_both = self.maps.squares(inputs, self.seen_at, ends, np.array([length, length]))
+        for squares in (of_movement, of_both):
+            squares += ((SHIFTS / SHIFT_STD) ** 2)[:, None]
+        return np.asarray((of_both.min(axis=1) - of_movement.min(axis=1)) / len(CHANNEL_LAGS))
+
+    def look(self, tick: int, window: FloatArray) -> float:
+        """The same at one tick, of a window as in `WindowMaps.look`."""
+        of_movement, of_channel = self.maps.look(tick, window, np.array([0, self._n_movement]), len(self._chosen))
+        of_movement += (SHIFTS / SHIFT_STD) ** 2
+        return float((of_movement + of_channel).min() - of_movement.min()) / len(CHANNEL_LAGS)
 
     def judge(self, ticks: IntArray, windows: FloatArray, means: FloatArray) -> FloatArray:
         """Squared distance per number at the ticks (T,) of windows (n, T, P, S) from means (n, M, S): (n, T) array.
@@ -63,8 +90,9 @@ class ChannelStatistic:
         residuals = self._residuals(rows, windows, means)
         white = np.matmul(self._whitening[rows], np.nan_to_num(residuals)[..., None])[..., 0]
         seen = ~np.isnan(residuals[:, :, 0])
-        for n, t in np.argwhere(~seen.all(axis=-1)):
-            white[n, t] = self._white_of_seen(rows[t], residuals[n, t], seen[n, t])
+        n, t = np.nonzero(~seen.all(axis=-1))
+        if len(n):
+            white[n, t] = self._white_of_seen(rows[t], residuals[n, t])
         squares = white**2
         penalties = (SHIFTS / SHIFT_STD) ** 2
         of_movement = squares[..., : self._n_movement].sum(axis=-1) + penalties
@@ -75,12 +103,18 @@ class ChannelStatistic:
 
     def contributions(self, tick: int, window: FloatArray, mean: FloatArray) -> FloatArray:
         """(S,) array: the squared distance of one window (P, S), signed by how what was seen last of the channel deviates."""
-        value = np.nan_to_num(self.judge(np.array([tick]), window[None, None], mean[None])[0, 0])
-        shares, seen = np.zeros(window.shape[1]), np.flatnonzero(~np.isnan(window[:, self._signal]))
-        if len(seen):  # there may be nothing now, where a sudden change is not believed yet
-            expected = mean[np.clip(tick + self.offsets[seen[-1]], 0, TICKS), self._signal]
-            shares[self._signal] = value * np.sign(window[seen[-1], self._signal] - expected)
+        shares, at = np.zeros(window.shape[1]), np.array([tick])
+        value = np.nan_to_num(self.judge(at, window[None, None], mean[None])[0, 0])
+        shares[self._signal] = value * self.signs(at, window[None], mean[None, np.clip(tick + self.offsets, 0, TICKS)])[0]
         return shares
+
+    def signs(self, ticks: IntArray, windows: FloatArray, expected: FloatArray) -> FloatArray:
+        """(n,) array: how what was seen last of the channel in windows (n, P, S) deviates from what is expected; or 0."""
+        deviations = (windows - expected)[..., self._signal]
+        seen, rows = ~np.isnan(deviations), np.arange(len(ticks))
+        last = seen.shape[1] - 1 - np.argmax(seen[:, ::-1], axis=1)
+        # There may be nothing now, where a sudden change is not believed yet.
+        return np.where(seen.any(axis=1), np.sign(np.nan_to_num(deviations[rows, last])), 0.0)
 
     def _residuals(self, rows: IntArray, windows: FloatArray, means: FloatArray) -> FloatArray:
         """What is compared minus its mean at each shift, (n, T, shifts, entries)."""
@@ -88,10 +122,9 @@ class ChannelStatistic:
         deviations = windows[:, :, None] - expected
         return np.asarray(deviations.reshape(*deviations.shape[:3], -1)[..., self._chosen])
 
-    def _white_of_seen(self, row: int, residuals: FloatArray, seen: BoolArray) -> FloatArray:
-        """A window whitened by what was seen of it alone, (shifts, entries); zero elsewhere."""
-        white = np.zeros_like(residuals)
-        if seen.any():
-            inverse = inverse_of_cholesky(self._covariances[row][:, seen][:, :, seen])
-            white[:, seen] = np.matmul(inverse, residuals[:, seen][..., None])[..., 0]
-        return white
+    def _white_of_seen(self, rows: IntArray, residuals: FloatArray) -> FloatArray:
+        """Windows (W, shifts, entries) whitened by what was seen of them alone; zero elsewhere."""
+        seen = ~np.isnan(residuals)
+        together = seen[..., None] & seen[..., None, :]
+        covariances = np.where(together, self._covariances[rows], np.eye(residuals.shape[-1]))
+        return whitened(covariances, np.where(seen, residuals, 0.0))[0]

@@ -1,18 +1,20 @@
 """Which primitive of a library fits an execution better than the one it should be."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import lgamma, log, pi
+from typing import NamedTuple
 
 import numpy as np
 
 from probdmp.checks import FloatArray
 from probdmp.detection.evidence import DEGREES_OF_FREEDOM
-from probdmp.detection.path_model import PathModel, path_model
+from probdmp.detection.path_model import path_model
 from probdmp.detection.phase_clock import TICKS
 from probdmp.detection.profile import ExecutionProfile
+from probdmp.detection.windows import whitened
 from probdmp.dmp import Primitive
 
-__all__ = ["Candidate", "Comparison"]
+__all__ = ["Candidates", "Comparison"]
 
 COMPARED_EVERY = 4
 """Ticks between the points that are compared; those between say little more."""
@@ -22,31 +24,46 @@ PLAUSIBLE = 2.0
 """Mean squared deviation up to which an execution may be one of another primitive."""
 
 
-class Candidate:
-    """A primitive that an execution may be.
+class Candidates(NamedTuple):
+    """R primitives that an execution may be one of, no goal told."""
 
-    Parameters
-    ----------
-    model : the Gaussian over its paths, no goal told.
-    ranges : (D,) array, data units.
-    duration : mean duration, seconds.
-    """
+    means: FloatArray
+    """(R, M, D) array, fractions of the range."""
+    covariances: FloatArray
+    """(R, M D, M D) array."""
+    noise_variances: FloatArray
+    """(R, D) array."""
+    ranges: FloatArray
+    """(R, D) array, data units."""
+    durations: FloatArray
+    """(R,) array: mean durations, seconds."""
 
-    def __init__(self, model: PathModel, ranges: FloatArray, duration: float) -> None:
-        self._model, self._ranges, self._duration = model, ranges, duration
+    @classmethod
+    def of(cls, primitives: Sequence[Primitive], profiles: Mapping[str, ExecutionProfile]) -> "Candidates":
+        """Of primitives with profiles by their identity."""
+        models = [path_model(p, profiles[p.identity], knows_goal=False).of_movement() for p in primitives]
+        size = models[0].means.size
+        return cls(
+            np.stack([model.means for model in models]),
+            np.stack([model.covariance.reshape(size, size) for model in models]),
+            np.stack([model.noise_variances for model in models]),
+            np.stack([p.ranges for p in primitives]),
+            np.array([p.duration for p in primitives]),
+        )
 
-    def log_density(self, times: FloatArray, displacements: FloatArray) -> tuple[float, float]:
-        """Of displacements (n, D) in data units at times (n,) in seconds, of a multivariate t, nats; and their mean square."""
-        phases = np.clip(np.rint(TICKS * times / self._duration).astype(int), 0, TICKS)
-        size = displacements.size
-        residuals = (displacements / self._ranges - self._model.means[phases]).ravel()
-        covariance = self._model.covariance[phases][:, :, phases].reshape(size, size)
-        factor = np.linalg.cholesky(covariance + np.diag(np.tile(self._model.noise_variances, len(times))))
-        square = float(np.sum(np.linalg.solve(factor, residuals) ** 2))
-        nu = DEGREES_OF_FREEDOM
-        scale = float(np.log(np.diag(factor)).sum() + len(times) * np.log(self._ranges).sum())
+    def log_densities(self, times: FloatArray, displacements: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Of displacements (n, D) in data units at times (n,), seconds, of a multivariate t; and mean squares. (R,) arrays."""
+        (n, d), r = displacements.shape, np.arange(len(self.durations))[:, None]
+        phases = np.clip(np.rint(TICKS * times / self.durations[:, None]).astype(int), 0, TICKS)
+        residuals = (displacements / self.ranges[:, None] - self.means[r, phases]).reshape(len(r), n * d)
+        rows = (phases[..., None] * d + np.arange(d)).reshape(len(r), n * d)
+        covariances = self.covariances[r[..., None], rows[:, :, None], rows[:, None, :]]
+        covariances[:, np.arange(n * d), np.arange(n * d)] += np.tile(self.noise_variances, n)
+        white, logarithms = whitened(covariances, residuals)
+        squares, nu, size = (white**2).sum(axis=1), DEGREES_OF_FREEDOM, n * d
+        scales = logarithms.sum(axis=1) + n * np.log(self.ranges).sum(axis=1)
         shape = lgamma((nu + size) / 2) - lgamma(nu / 2) - size / 2 * log(nu * pi)
-        return shape - scale - (nu + size) / 2 * float(np.log1p(square / nu)), square / size
+        return shape - scales - (nu + size) / 2 * np.log1p(squares / nu), squares / size
 
 
 class Comparison:
@@ -61,7 +78,7 @@ class Comparison:
     def __init__(self, primitives: Mapping[str, Primitive], profiles: Mapping[str, ExecutionProfile]) -> None:
         self._labels = {primitive.identity: label for label, primitive in primitives.items()}
         self._primitives, self._profiles = primitives, profiles
-        self._candidates: dict[str, Candidate] = {}
+        self._candidates: dict[tuple[str, ...], Candidates] = {}
 
     def better(self, own: Primitive, times: FloatArray, displacements: FloatArray) -> str:
         """Label of the likeliest primitive if it is clearly likelier than the own one, else nothing.
@@ -75,14 +92,13 @@ class Comparison:
         rivals = [label for label, p in self._primitives.items() if p.names == own.names]
         if len(seen) < 2 or len(rivals) < 2:
             return ""
-        fits = {label: self._candidate(label).log_density(times[seen], displacements[seen]) for label in rivals}
-        best = max(fits, key=lambda label: fits[label][0])
-        clearly = fits[best][0] > fits[self._labels[own.identity]][0] + MARGIN
-        return best if clearly and fits[best][1] < PLAUSIBLE else ""
+        if own.names not in self._candidates:
+            self._candidates[own.names] = Candidates.of([self._primitives[label] for label in rivals], self._profiles)
+        densities, mean_squares = self._candidates[own.names].log_densities(times[seen], displacements[seen])
+        best = int(np.argmax(densities))
+        clearly = densities[best] > densities[rivals.index(self._label(own))] + MARGIN
+        return rivals[best] if clearly and mean_squares[best] < PLAUSIBLE else ""
 
-    def _candidate(self, label: str) -> Candidate:
-        if label not in self._candidates:
-            primitive = self._primitives[label]
-            model = path_model(primitive, self._profiles[primitive.identity], knows_goal=False).of_movement()
-            self._candidates[label] = Candidate(model, primitive.ranges, primitive.duration)
-        return self._candidates[label]
+    def _label(self, own: Primitive) -> str:
+        found = [label for label, primitive in self._primitives.items() if primitive is own]
+        return found[0] if found else self._labels[own.identity]  # which takes its time

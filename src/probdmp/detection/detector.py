@@ -16,10 +16,11 @@ from probdmp.detection.library import Learned, Library, own_tasks
 from probdmp.detection.monitoring import LikelihoodMonitor
 from probdmp.detection.options import DetectorOptions
 from probdmp.detection.paper_rule import PaperRule
+from probdmp.detection.recorded_signals import RecordedSignals
 from probdmp.detection.thresholds import PaperThreshold
 from probdmp.detection.trajectory_family import tells_goal
 from probdmp.detection.verdict import Verdict
-from probdmp.dmp import Primitive, Task, unstack_tasks
+from probdmp.dmp import Primitive, Task, stack_tasks, unstack_tasks
 from probdmp.errors import InputError, InputTypeError, NotFittedError
 from probdmp.execution import ExecutionBatch, Observed, Sensor, SensorArray, check_tasks
 from probdmp.execution.plain_sensors import sensors_as_plain, sensors_from_plain
@@ -133,9 +134,7 @@ class FailureDetector:
         outputs : names of what the sensors of the execution measure; those that the detector was fitted with, unless given.
         """
         rule = self._fitted()
-        if primitive.identity not in {own.identity for own in self.primitives_.values()}:
-            hint = "Learned anew? Fit the detector again too."
-            raise InputError("a primitive that this detector was fitted to", "another one", hint)
+        self._check_known(primitive)
         fitted = self._outputs[primitive.identity]
         if outputs is not None and outputs != fitted:
             hint = "Give fit(…, sensors=…) those that observe executions; what is normal depends on them."
@@ -164,23 +163,17 @@ class FailureDetector:
         for label, members in self._members(recordings).items():
             primitive, chosen = self.primitives_[label], [recordings[k] for k in members]
             asked = [tasks[k] for k in members] if tasks is not None else own_tasks(primitive, chosen)
-            for k, (monitor, ticks) in zip(members, self.replay(primitive, asked, chosen), strict=True):
-                for observed in ticks:
-                    monitor.update(observed)
-                verdicts[k] = monitor.verdict
+            verdicts |= zip(members, self._verdicts(primitive, asked, chosen), strict=True)
         return [verdicts[k] for k in range(len(recordings))]
 
     def judge(self, primitive: Primitive, batch: ExecutionBatch) -> BatchJudgement:
         """Verdicts on many executions of one primitive at once, as arrays; those of `verdicts` are the same."""
-        self._fitted()
-        sensors = SensorArray(primitive, self.sensors_)
-        recordings = list(batch.recordings(sensors))
-        verdicts = []
-        for monitor, ticks in self.replay(primitive, unstack_tasks(batch.tasks), recordings):
-            for observed in ticks:
-                monitor.update(observed)
-            verdicts.append(monitor.verdict)
-        return BatchJudgement.of(verdicts)
+        rule, array = self._fitted(), SensorArray(primitive, self.sensors_)
+        self._check_known(primitive)
+        judgement = rule.judge(primitive, batch.tasks, lambda: RecordedSignals.of_batch(array, batch))
+        if judgement is not None:
+            return BatchJudgement.of_judgement(judgement, rule.watched(primitive))
+        return BatchJudgement.of(self._replayed(primitive, unstack_tasks(batch.tasks), list(batch.recordings(array))))
 
     def predict(
         self, executions: Recordings, dt: float | None = None, tasks: Sequence[Task] | None = None
@@ -222,6 +215,29 @@ class FailureDetector:
             for name, value in parts["options"].items():
                 setattr(detector, name, value)
         return detector
+
+    def _check_known(self, primitive: Primitive) -> None:
+        if primitive.identity not in {own.identity for own in self.primitives_.values()}:
+            hint = "Learned anew? Fit the detector again too."
+            raise InputError("a primitive that this detector was fitted to", "another one", hint)
+
+    def _verdicts(self, primitive: Primitive, tasks: Sequence[Task], recordings: Sequence[Demonstration]) -> list[Verdict]:
+        """On recordings of one primitive."""
+        rule, array = self._fitted(), SensorArray(primitive, self.sensors_)
+        judgement = rule.judge(primitive, stack_tasks(tasks), lambda: RecordedSignals.of(array, recordings))
+        if judgement is None:
+            return self._replayed(primitive, tasks, recordings)
+        names = rule.watched(primitive)
+        return [judgement.verdict(k, names) for k in range(len(recordings))]
+
+    def _replayed(self, primitive: Primitive, tasks: Sequence[Task], recordings: Sequence[Demonstration]) -> list[Verdict]:
+        """The same, each shown to a monitor tick by tick."""
+        verdicts = []
+        for monitor, ticks in self.replay(primitive, tasks, recordings):
+            for observed in ticks:
+                monitor.update(observed)
+            verdicts.append(monitor.verdict)
+        return verdicts
 
     def _options(self) -> DetectorOptions:
         return DetectorOptions(self.false_alarm_rate, self.statistic, self.calibration, self.pooled, self.persistence)

@@ -20,6 +20,7 @@ from probdmp.checks import FloatArray
 from probdmp.detection.evidence import DEGREES_OF_FREEDOM
 from probdmp.detection.path_model import PathModel
 from probdmp.detection.phase_clock import TICKS
+from probdmp.detection.windows import whitened
 
 __all__ = ["LOOKED_AT", "Diagnosis", "diagnose"]
 
@@ -99,8 +100,8 @@ def _is_held(means: FloatArray, recent: Sequence[FloatArray], tick: int, extents
     place = latest.mean(axis=0)
     if np.any(np.sqrt(np.mean((latest - place) ** 2, axis=0)) > extents):
         return False
-    moved = [j for j, there in enumerate(reversed(recent)) if np.any(np.abs(there - place) > 3 * extents)]
-    since = moved[0] if moved else len(recent)
+    moved = np.flatnonzero(np.any(np.abs(np.stack(recent[::-1]) - place) > 3 * extents, axis=1))
+    since = int(moved[0]) if len(moved) else len(recent)
     due = means[min(tick, TICKS)] - means[min(max(tick - since, 0), TICKS)]
     return bool(np.any(np.abs(due) > np.maximum(5 * extents, LEAST_DUE)))
 
@@ -146,15 +147,17 @@ def _fit(
     widths = explanations.widths[:, None]
     bumps = np.where(since < widths, np.sin(np.pi * since / np.maximum(widths, 1)) ** 2, 0.0)
     aside = ASIDE_STD * (np.minimum(since / explanations.rises[:, None], 1.0) + bumps)
-    whole = model.covariance.transpose(0, 2, 1, 3)  # (M, M, D, D)
-    blocks = whole[phases[:, :, None], phases[:, None, :]]
-    blocks = blocks + (aside[:, :, None] * aside[:, None, :])[..., None, None] * np.eye(dof)
-    covariances = blocks.transpose(0, 1, 3, 2, 4).reshape(count, points * dof, -1)
-    factors = np.linalg.cholesky(covariances + np.diag(np.tile(model.noise_variances, points)))
-    residuals = (path - means[phases]).reshape(count, -1, 1)
-    squares = np.linalg.solve(factors, residuals).reshape(count, points, dof) ** 2
+    whole = model.covariance.reshape(model.means.size, -1)
+    rows = (phases[..., None] * dof + np.arange(dof)).reshape(count, points * dof)
+    covariances = whole[rows[:, :, None], rows[:, None, :]]
+    by_dof = covariances.reshape(count, points, dof, points, dof)
+    moved = aside[:, :, None] * aside[:, None, :]
+    for d in range(dof):
+        by_dof[:, :, d, :, d] += moved
+    covariances[:, np.arange(points * dof), np.arange(points * dof)] += np.tile(model.noise_variances, points)
+    white, logarithms = whitened(covariances, (path - means[phases]).reshape(count, -1))
+    squares, determinants = white.reshape(count, points, dof) ** 2, logarithms.sum(axis=-1)
     nu, size = DEGREES_OF_FREEDOM, points * dof
-    determinants = np.log(np.diagonal(factors, axis1=-2, axis2=-1)).sum(axis=-1)
     density = -determinants - (nu + size) / 2 * np.log1p(squares.sum(axis=(1, 2)) / nu)
     later = since > 0
     after = np.where(later[:, :, None], squares, 0.0).sum(axis=(1, 2))

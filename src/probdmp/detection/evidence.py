@@ -7,7 +7,10 @@ The forecast from all that came before is a multivariate t over the path, mixed 
 how slanted, how late and how careless this very execution is.
 """
 
+from collections.abc import Sequence
+from functools import cached_property
 from math import lgamma, log, pi
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +18,8 @@ from probdmp.checks import FloatArray, IntArray
 from probdmp.detection.path_model import PathModel
 from probdmp.detection.phase_clock import TICKS
 from probdmp.detection.trajectory_statistics import SHIFT_STD
+from probdmp.detection.window_kernels import log_mixtures
+from probdmp.detection.window_maps import WindowInputs, WindowMaps
 from probdmp.detection.windows import PathWindows, inverse_of_cholesky
 
 __all__ = ["DEGREES_OF_FREEDOM", "EVIDENCE", "Evidence", "Foreseen", "Pace", "Standstill"]
@@ -42,12 +47,52 @@ class Foreseen:
     """
 
     def __init__(self, model: PathModel, offsets: IntArray, shifts: IntArray, n_places: int) -> None:
-        self._windows = PathWindows(model, offsets, shifts, n_places)
+        self._windows, self._dof = PathWindows(model, offsets, shifts, n_places), model.means.shape[1]
         sizes = np.arange(len(offsets) * model.means.shape[1] + 1)
         gammas = np.array([lgamma((DEGREES_OF_FREEDOM + size) / 2) - lgamma(DEGREES_OF_FREEDOM / 2) for size in sizes])
         self._t_constants = gammas - sizes / 2 * log(DEGREES_OF_FREEDOM * pi)
         prior = np.exp(-((shifts / SHIFT_STD) ** 2) / 2)
         self._log_prior = np.log(prior / prior.sum())
+        counts = self._dof * np.arange(1, len(offsets) + 1)
+        scales = self._t_constants[counts] + self._windows.log_determinants + self._log_prior[:, None]
+        # p^(-2 / halves): what 1 + square / freedom is multiplied with before it is raised to that power
+        self._bases = np.exp(scales / (-(DEGREES_OF_FREEDOM + counts) / 2))
+
+    def mixtures(self, inputs: WindowInputs, offsets: IntArray, points: IntArray, wanted: IntArray) -> list[FloatArray]:
+        """Log-densities of the first points of windows at the first places, of executions side by side.
+
+        Parameters
+        ----------
+        inputs : of which nothing is unseen.
+        offsets : (P) ticks at which the points are seen, relative to the place.
+        points, wanted : (J) of so many points, increasing, at so many places, not increasing.
+
+        Returns
+        -------
+        J arrays (wanted, n).
+        """
+        squares = self._windows.squares(inputs, offsets, points, wanted)
+        return [
+            log_mixtures(
+                some, self._bases[: len(some), :, n - 1], int(DEGREES_OF_FREEDOM) + int(n) * self._dof, DEGREES_OF_FREEDOM
+            )
+            for some, n in zip(squares, points, strict=True)
+        ]
+
+    def looks(self, points: IntArray, places: IntArray) -> "Looks":
+        """Ready to be asked about the first points and all points of single executions.
+
+        Parameters
+        ----------
+        points : (H, 2) numbers of points of H windows.
+        places : (T, H) where the windows are at each tick.
+        """
+        ends, rows = points * self._dof, np.minimum(places, len(self._bases) - 1)[..., None]
+        # (T, H, 2, A)
+        bases = np.take_along_axis(self._bases[rows[..., 0]].swapaxes(-1, -2), (points - 1)[None, ..., None], axis=2)
+        starts = [np.array([0, first]) for first in ends[:, 0]]
+        powers = (DEGREES_OF_FREEDOM + ends) / 2
+        return Looks(self._windows.maps, places.tolist(), starts, ends[:, 1].tolist(), bases, powers)
 
     def log_densities(self, places: IntArray, windows: FloatArray, means: FloatArray) -> FloatArray:
         """Of the points of windows (n, T, P, D) up to each one: (n, T, P) array."""
@@ -55,6 +100,32 @@ class Foreseen:
         scaled = np.log1p(white.squares / DEGREES_OF_FREEDOM) * (DEGREES_OF_FREEDOM + white.counts) / 2
         densities = self._t_constants[white.counts] + white.log_determinants - scaled + self._log_prior[:, None]
         return np.asarray(np.logaddexp.reduce(densities, axis=2))
+
+
+class Looks(NamedTuple):
+    """What is computed before to look at single executions fast: H windows at each of T ticks."""
+
+    maps: WindowMaps
+    places: list[list[int]]
+    starts: list[IntArray]
+    ends: list[int]
+    bases: FloatArray
+    """(T, H, 2, A) array."""
+    powers: FloatArray
+    """(H, 2) array."""
+
+    def log_densities(self, tick: int, windows: Sequence[FloatArray]) -> FloatArray:
+        """Of the first points and of all, (H, 2) array, of windows as in `WindowMaps.look`."""
+        bases, squares = self.bases[tick], np.empty(self.bases.shape[1:])
+        for h, place in enumerate(self.places[tick]):
+            squares[h] = self.maps.look(place, windows[h], self.starts[h], self.ends[h])
+        squares[:, 1] += squares[:, 0]
+        squares /= DEGREES_OF_FREEDOM
+        squares += 1
+        squares *= bases
+        least = squares.min(axis=-1)
+        mixed = ((least[..., None] / squares) ** self.powers[..., None]).sum(axis=-1)
+        return np.asarray(np.log(mixed) - self.powers * np.log(least))
 
 
 class Standstill:
@@ -71,6 +142,78 @@ class Standstill:
         n_ahead = len(self.ahead)
         self._rest_whitening = inverse_of_cholesky(np.ones((n_ahead, n_ahead)) + np.eye(n_ahead))
         self._rest_stds = np.sqrt(REST_STD**2 + model.noise_variances)
+        self._points_at = np.array([np.searchsorted(self.ahead, h, "right") for h in self.horizons])
+        self._constants = np.array([self._rest_constants(int(points)) for points in self._points_at])
+
+    def weigh(self, inputs: WindowInputs, wanted: IntArray) -> list[FloatArray]:
+        """The same for each horizon at so many places, the first ones: J arrays (wanted, n).
+
+        Parameters
+        ----------
+        inputs : of which nothing is unseen.
+        """
+        before = len(self.before)
+        points = np.array([before, *(before + self._points_at)])
+        offsets = np.concatenate([-self.before, self.ahead])
+        here, *together = self._going_on.mixtures(inputs, offsets, points, np.array([wanted[0], *wanted]))
+        resting = self._resting(inputs.paths[:, : len(self._rest_stds)], wanted)
+        return [rest - (mixed - here[: len(mixed)]) for rest, mixed in zip(resting, together, strict=True)]
+
+    @cached_property
+    def _looks(self) -> Looks:
+        before = len(self.before)
+        points = np.stack([np.full_like(self._points_at, before), before + self._points_at], axis=1)
+        return self._going_on.looks(points, np.maximum(np.arange(self.last + 1)[:, None] - np.array(self.horizons), 0))
+
+    @cached_property
+    def _compared(self) -> tuple[IntArray, IntArray, IntArray]:
+        """Where the numbers after each place are in all windows, and those of the place; and where the points begin."""
+        dof, first = len(self._rest_stds), 1 + len(self._rest_stds)
+        sizes = first + (len(self.before) + self._points_at) * dof
+        ahead = [np.arange(end - n * dof, end) for end, n in zip(np.cumsum(sizes), self._points_at, strict=True)]
+        here = [np.tile(np.arange(rows[0] - dof, rows[0]), len(rows) // dof) for rows in ahead]
+        return np.concatenate(ahead), np.concatenate(here), np.cumsum(self._points_at) - self._points_at
+
+    def look(self, tick: int, windows: Sequence[FloatArray]) -> FloatArray:
+        """The same now of one execution, (J,) array; of no meaning where the place would be before the start.
+
+        Parameters
+        ----------
+        windows : for each horizon as in `WindowMaps.look`.
+        """
+        here, together = self._looks.log_densities(tick, windows).T
+        (ahead, place, starts), numbers = self._compared, np.concatenate(windows)
+        moved = (numbers[ahead] - numbers[place]).reshape(-1, len(self._rest_stds))
+        moved /= self._rest_stds
+        sums = np.add.reduceat(moved, starts)
+        moved *= moved
+        distances = (np.add.reduceat(moved, starts) - sums * sums / (self._points_at[:, None] + 1)).sum(axis=1)
+        return np.asarray(self._constants - distances / 2 - (together - here))
+
+    def _resting(self, paths: FloatArray, wanted: IntArray) -> list[FloatArray]:
+        """Log-densities of what follows places of paths (T, D, n) up to each horizon, if it is all where it is there."""
+        found: list[FloatArray] = []
+        done, scales = 0, 1 / self._rest_stds[:, None]
+        here = paths[: wanted[0]] * scales
+        sums, squares = np.zeros((2, *here.shape))
+        for count, points in zip(wanted, self._points_at, strict=True):
+            here, sums, squares = here[:count], sums[:count], squares[:count]
+            for ahead in self.ahead[done:points]:
+                moved = paths[ahead : ahead + count] * scales
+                moved -= here
+                sums += moved
+                squares += np.square(moved, out=moved)
+            done = points
+            # (1 1^T + I)^-1 = I - 1 1^T / (n + 1)
+            distances = (squares - sums**2 / (points + 1)).sum(axis=1)
+            found.append(self._constants[len(found)] - distances / 2)
+        return found
+
+    def _rest_constants(self, points: int) -> float:
+        """ln of the density of so many points where it is largest."""
+        dof = len(self._rest_stds)
+        scale = float(np.log(np.diagonal(self._rest_whitening))[:points].sum()) * dof
+        return scale - points * (float(np.log(self._rest_stds).sum()) + dof / 2 * log(2 * pi))
 
     def judge(self, places: IntArray, windows: FloatArray, means: FloatArray) -> FloatArray:
         """ln p(at rest since the place) / p(gone on) for every point ahead that windows (n, T, P, D) hold: (n, T, points)."""
@@ -106,6 +249,29 @@ class Pace:
             Foreseen(model, np.concatenate([-self.before, ahead]), self.shifts, TICKS + 1)
             for ahead in (self.ahead, np.rint(SLOWED * self.ahead).astype(int))
         )
+
+    def weigh(self, inputs: WindowInputs, wanted: IntArray) -> list[FloatArray]:
+        """The same for each horizon at so many places, the first ones: J arrays (wanted, n).
+
+        Parameters
+        ----------
+        inputs : of which nothing is unseen.
+        """
+        points = len(self.before) + np.array([np.searchsorted(self.ahead, h, "right") for h in self.horizons])
+        offsets = np.concatenate([-self.before, self.ahead])
+        slowed, going_on = (a.mixtures(inputs, offsets, points, wanted) for a in (self._slowed, self._going_on))
+        return [one - other for one, other in zip(slowed, going_on, strict=True)]
+
+    @cached_property
+    def _looks(self) -> tuple[Looks, Looks]:
+        points = np.array([[len(self.before), len(self.before) + len(self.ahead)]])
+        places = np.maximum(np.arange(self.last + 1)[:, None] - np.array(self.horizons), 0)
+        return self._slowed.looks(points, places), self._going_on.looks(points, places)
+
+    def look(self, tick: int, windows: Sequence[FloatArray]) -> FloatArray:
+        """The same now of one execution, (J,) array; arguments as for `Standstill.look`."""
+        slowed, going_on = self._looks
+        return np.asarray(slowed.log_densities(tick, windows)[:, 1] - going_on.log_densities(tick, windows)[:, 1])
 
     def judge(self, places: IntArray, windows: FloatArray, means: FloatArray) -> FloatArray:
         """ln p(slow since the place) / p(gone on) for every point ahead that windows (n, T, P, D) hold: (n, T, points).

@@ -8,7 +8,7 @@ from probdmp.detection.profile import ExecutionProfile
 from probdmp.detection.sensor_watch import SensorWatch
 from probdmp.dmp import Primitive, Task
 
-__all__ = ["ExecutionTicks", "ticks_of_recording"]
+__all__ = ["ExecutionTicks"]
 
 
 class ExecutionTicks:
@@ -35,17 +35,3 @@ class ExecutionTicks:
             d = self._n_dof
             self._has_begun, self.goal = True, (self._task.goal - self._start[:d]) / self._ranges[:d]
         return ticks
-
-
-def ticks_of_recording(
-    primitive: Primitive, profile: ExecutionProfile, task: Task, dt: float, measured: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Displacements and channels of a whole recording at its ticks, (T, S), and its goal, (D,).
-
-    Parameters
-    ----------
-    measured : its signals, (T, S) array.
-    """
-    ticks = ExecutionTicks(primitive, profile, task, dt)
-    path = [tick.values for t, row in enumerate(measured) for tick in ticks.advance(t * dt, row)]
-    return np.stack(path) if path else np.zeros((0, measured.shape[1])), ticks.goal

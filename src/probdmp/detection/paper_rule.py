@@ -61,6 +61,14 @@ class PaperRule:
         for task, recording, ticks in zip(tasks, recordings, replayed, strict=True):
             yield self.monitor(primitive, task, recording.dt), ticks
 
+    def watched(self, primitive: Primitive) -> tuple[str, ...]:
+        """Names of what is judged: the outputs of the sensors."""
+        return self.arrays[primitive.identity].outputs
+
+    def judge(self, primitive: Primitive, tasks: Task, recorded: object) -> None:
+        """Recordings are not judged side by side: the filter has to be asked."""
+        return
+
     def state(self) -> dict[str, Any]:
         """Plain values."""
         return {"likelihood": self.likelihood, "minima": {i: t.minimum for i, t in self.thresholds.items()}}

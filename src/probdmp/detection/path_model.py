@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from probdmp.checks import FloatArray
+from probdmp.checks import FloatArray, IntArray
 from probdmp.detection.phase_clock import TICKS
 from probdmp.detection.profile import ExecutionProfile
 from probdmp.dmp import Primitive, path_distribution
@@ -41,10 +41,17 @@ class PathModel:
     noise_variances: FloatArray
     """R, (S,) array."""
 
+    def ahead(self, goals: FloatArray) -> FloatArray:
+        """How far goals (n, D), as displacements, lie from the mean one, (n, D) array; 0 where not told."""
+        return np.nan_to_num(goals - self.means[-1, : goals.shape[-1]])
+
     def means_for(self, goals: FloatArray) -> FloatArray:
         """Mean paths of executions with goals (n, D), as displacements; NaN where not told. (n, M, S) array."""
-        ahead = np.nan_to_num(goals - self.means[-1, : goals.shape[-1]])
-        return np.asarray(self.means + np.einsum("mde,ne->nmd", self.goal_gains, ahead))
+        return np.asarray(self.means + np.einsum("mde,ne->nmd", self.goal_gains, self.ahead(goals)))
+
+    def means_at(self, ticks: IntArray, goals: FloatArray) -> FloatArray:
+        """The same at ticks (n, P) of each execution alone: (n, P, S) array."""
+        return np.asarray(self.means[ticks] + np.matmul(self.goal_gains[ticks], self.ahead(goals)[:, None, :, None])[..., 0])
 
     def of_movement(self) -> "PathModel":
         """Without the channels."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from probdmp.checks import FloatArray
 
-__all__ = ["TICKS", "PhaseClock", "Tick"]
+__all__ = ["TICKS", "PhaseClock", "Tick", "longest_gaps"]
 
 TICKS = 100
 """Ticks in a movement, hence TICKS + 1 phases from its start to its end."""
@@ -30,6 +30,20 @@ class Tick(NamedTuple):
     """(S,) array, as given to the clock; NaN where nothing was seen around the tick."""
 
 
+def longest_gaps(usual_gaps: FloatArray, rate: FloatArray, dt: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Ticks across which the path is taken for straight, and for which a sample is waited for.
+
+    Parameters
+    ----------
+    usual_gaps : (S,) array, seconds: how far apart the samples of each signal are; infinite for what is never measured.
+    rate, dt : ticks per second, and seconds between samples.
+    """
+    measured = np.isfinite(usual_gaps)
+    gaps = 1.5 * np.where(measured, usual_gaps, 0.0) * rate
+    longest = np.maximum(np.maximum(LONGEST_GAP, 2.5 * dt * rate), gaps)
+    return longest, np.where(measured, longest, -np.inf)  # what is never measured is not waited for
+
+
 class PhaseClock:
     """Turns the samples of one execution into ticks.
 
@@ -41,10 +55,7 @@ class PhaseClock:
 
     def __init__(self, usual_gaps: FloatArray, duration: float, dt: float) -> None:
         self._rate = TICKS / duration
-        measured = np.isfinite(usual_gaps)
-        gaps = 1.5 * np.where(measured, usual_gaps, 0.0) * self._rate
-        self._longest_gaps = np.maximum(max(LONGEST_GAP, 2.5 * dt * self._rate), gaps)
-        self._patience = np.where(measured, self._longest_gaps, -np.inf)  # what is never measured is not waited for
+        self._longest_gaps, self._patience = longest_gaps(usual_gaps, np.asarray(self._rate), np.asarray(dt))
         self._last_times = np.full(len(usual_gaps), -np.inf)
         self._last_values = np.full(len(usual_gaps), np.nan)
         self._pending: list[Tick] = []

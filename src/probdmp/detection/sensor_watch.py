@@ -7,7 +7,7 @@ movement, and a movement that runs away soon does.
 
 import numpy as np
 
-from probdmp.checks import FloatArray
+from probdmp.checks import BoolArray, FloatArray, IntArray
 from probdmp.detection.profile import ExecutionProfile
 
 __all__ = ["SensorWatch"]
@@ -34,74 +34,97 @@ GAP_FACTOR = 2.0
 """But for a sensor that measures less often than that: for so many times as long as is usual in the demonstrations."""
 
 
+CAUSES = ("", "stuck", "spikes")
+
+
 class SensorWatch:
-    """The sensors of one execution.
+    """The sensors of one execution, or of a batch of them side by side.
 
     Parameters
     ----------
     profile : what the demonstrations showed.
     ranges : (S,) array, units of each signal.
     n_dof : how many of the signals are positions.
-    duration, dt : seconds, of the movement and between samples.
+    duration, dt : (*batch) arrays, seconds, of the movement and between samples.
     """
 
-    def __init__(self, profile: ExecutionProfile, ranges: FloatArray, n_dof: int, duration: float, dt: float) -> None:
+    def __init__(
+        self,
+        profile: ExecutionProfile,
+        ranges: FloatArray,
+        n_dof: int,
+        duration: FloatArray | float,
+        dt: FloatArray | float,
+    ) -> None:
         n_signals = len(ranges)
-        self._n_dof = n_dof
+        self._n_dof, shape = n_dof, (*np.shape(duration), n_signals)
+        duration, dt = np.asarray(duration)[..., None], np.asarray(dt)[..., None]
         self._largest_jumps = np.maximum(JUMP_FACTOR * profile.largest_jumps, LEAST_JUMP * ranges)
         longest = profile.longest_repeats / dt
         self._most_repeats = np.where(
             longest > COARSE_REPEATS,
             np.maximum(COARSE_FACTOR * longest, COARSE_SHARE * duration / dt),
-            max(LEAST_REPEATS, LEAST_REPEAT_SHARE * duration / dt),
+            np.maximum(LEAST_REPEATS, LEAST_REPEAT_SHARE * duration / dt),
         )
         # A force may well be constant, at rest or at its limit; if it should not be, its own statistic says so.
         self._most_repeats = np.where(np.arange(n_signals) < n_dof, self._most_repeats, np.inf)
-        self._most_silent = np.maximum(max(SILENCE_SHARE * duration / dt, 2.0), GAP_FACTOR * profile.usual_gaps / dt)
-        unknown = np.full(n_signals, np.nan)
+        self._most_silent = np.maximum(np.maximum(SILENCE_SHARE * duration / dt, 2.0), GAP_FACTOR * profile.usual_gaps / dt)
+        unknown = np.full(shape, np.nan)
         self._believed = (unknown, unknown)
         """The last sample but one, and the last."""
         self._is_calm = False
-        self._suspicious = np.full(n_signals, np.nan)
-        self._last = np.full(n_signals, np.nan)
-        self._silent, self._skipped = np.zeros(n_signals), np.zeros(n_signals)
-        self.repeats, self.spikes = np.zeros(n_signals), np.zeros(n_signals)
+        self._suspicious, self._last = unknown, unknown
+        self._silent, self._skipped = np.zeros(shape), np.zeros(shape)
+        self.repeats, self.spikes = np.zeros(shape), np.zeros(shape)
+
+    @property
+    def causes(self) -> IntArray:
+        """(*batch) array: which of `CAUSES` applies."""
+        # If nothing moves at all, whether by exact numbers or not, it is the movement that stands still.
+        is_stuck = np.any(self.repeats > self._most_repeats, axis=-1) & ~self._all_repeat
+        has_spikes = self.spikes.sum(axis=-1) > MOST_SPIKES
+        return np.where(is_stuck, CAUSES.index("stuck"), np.where(has_spikes, CAUSES.index("spikes"), 0))
 
     @property
     def cause(self) -> str:
-        """What is wrong, in a word or two; nothing if nothing is."""
-        # If nothing moves at all, whether by exact numbers or not, it is the movement that stands still.
-        if np.any(self.repeats > self._most_repeats) and not self._all_repeat:
-            return "stuck"
-        return "spikes" if self.spikes.sum() > MOST_SPIKES else ""
+        """What is wrong with a single execution, in a word or two; nothing if nothing is."""
+        return CAUSES[int(self.causes)]
 
     @property
-    def _all_repeat(self) -> bool:
-        """Whether each of several positions is the same number again and again."""
-        return self._n_dof > 1 and bool(np.all(self.repeats[: self._n_dof] > 0))
+    def _all_repeat(self) -> BoolArray:
+        """(*batch) array: whether each of several positions is the same number again and again."""
+        return np.all(self.repeats[..., : self._n_dof] > 0, axis=-1) & (self._n_dof > 1)
 
     @property
-    def is_stale(self) -> bool:
-        """Whether a sensor has been silent for too long."""
-        return self.staleness > 1
+    def is_stale(self) -> BoolArray:
+        """(*batch) array: whether a sensor has been silent for too long."""
+        return np.asarray(self.staleness > 1)
 
     @property
     def shares(self) -> FloatArray:
-        """(S,) array: of what is wrong with each sensor to what may be."""
+        """(*batch, S) array: of what is wrong with each sensor to what may be."""
         return np.maximum(self.repeats / self._most_repeats, self.spikes / MOST_SPIKES)
 
     @property
-    def ratio(self) -> float:
-        """Of what is wrong to what may be, of all sensors together; above 1 for a fault."""
-        return max(float(np.max(self.repeats / self._most_repeats)), float(self.spikes.sum()) / MOST_SPIKES)
+    def ratio(self) -> FloatArray:
+        """(*batch) array: of what is wrong to what may be, of all sensors together; above 1 for a fault."""
+        return np.maximum(np.max(self.repeats / self._most_repeats, axis=-1), self.spikes.sum(axis=-1) / MOST_SPIKES)
 
     @property
-    def staleness(self) -> float:
-        """How long a sensor has been silent relative to how long it may be; above 1 when it is stale."""
-        return float(np.max(self._silent / self._most_silent))
+    def staleness(self) -> FloatArray:
+        """(*batch) array: how long a sensor has been silent relative to how long it may be; above 1 when it is stale."""
+        return np.asarray(np.max(self._silent / self._most_silent, axis=-1))
+
+    def is_plain(self, recorded: FloatArray) -> BoolArray:
+        """(N,) array: whether of a whole recording, (N, T, S), all is measured and believed, and nothing repeats."""
+        steps = np.diff(recorded, axis=1)
+        jumps = np.abs(np.diff(steps, axis=1)) <= self._largest_jumps
+        # A difference of exactly zero is a repetition; of what was not measured, it is NaN.
+        moves = (steps != 0) & ~np.isnan(steps)
+        return jumps.all(axis=(1, 2)) & moves.all(axis=(1, 2)) & ~np.isnan(recorded[:, 0]).any(axis=-1)
 
     def believe(self, measured: FloatArray) -> FloatArray:
-        """The sample (S,) without what is suspicious of it, which is NaN instead; units of each signal."""
+        """The sample (*batch, S) without what is suspicious of it, which is NaN instead; units of each signal."""
         older, old = self._believed
         jumps = np.abs(measured - old - (self._skipped + 1) * (old - older))
         if self._is_calm and np.all(jumps <= self._largest_jumps) and not np.any(measured == self._last):

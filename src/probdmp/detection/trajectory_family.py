@@ -5,18 +5,22 @@ from typing import Any, Self
 
 import numpy as np
 
-from probdmp.checks import FloatArray
+from probdmp.checks import FloatArray, IntArray
 from probdmp.demonstrations import Demonstration
 from probdmp.detection.comparison import Comparison
-from probdmp.detection.execution_ticks import ticks_of_recording
+from probdmp.detection.expectation import Expectation, watched_names
 from probdmp.detection.innovation_watch import InnovationWatch, watched_sensors
+from probdmp.detection.judgement import Standard, Verdicts, judge_recorded
 from probdmp.detection.library import Library, Member
 from probdmp.detection.monitoring import replay
 from probdmp.detection.path_model import path_model
 from probdmp.detection.profile import ExecutionProfile
+from probdmp.detection.recorded_sensors import Sensing
+from probdmp.detection.recorded_signals import RecordedSignals
+from probdmp.detection.recorded_ticks import record_ticks
 from probdmp.detection.trajectory_model import MOVEMENT_CHANNELS, TrajectoryModel, channels_for
-from probdmp.detection.trajectory_source import Expectation, TrajectorySource, watched_names
-from probdmp.dmp import Primitive, Task
+from probdmp.detection.trajectory_source import TrajectorySource
+from probdmp.dmp import Primitive, Task, stack_tasks
 from probdmp.dmp.phase import phases_at
 from probdmp.errors import InputError
 from probdmp.execution import Observed, SensorArray, readings_of
@@ -102,6 +106,31 @@ class TrajectoryFamily:
         for task, recording, value, observed in zip(tasks, recordings, values, shown, strict=True):
             yield TrajectorySource(self._expectation(primitive, tells_goal(task)), task, recording.dt, value), observed
 
+    def judges_recordings(self, primitive: Primitive) -> bool:
+        """Whether recordings may be judged side by side: no sensor of the primitive needs the filter."""
+        return not watched_sensors(self._arrays[primitive.identity])
+
+    def judge(
+        self, primitive: Primitive, tasks: Task, standards: Mapping[bool, Standard], recorded: RecordedSignals
+    ) -> list[tuple[IntArray, Verdicts]]:
+        """Which of the executions, and what is said of them; all of them together in parts.
+
+        Parameters
+        ----------
+        tasks : with the batch axis (N).
+        standards : by whether the goal is told.
+        """
+        profile, told = self.profiles[primitive.identity], ~np.isnan(tasks.goal).any(axis=1)
+        sensing, found = Sensing(profile, primitive.signals.ranges, primitive.n_dof), []
+        for knows_goal, standard in standards.items():
+            expectation = self._expectation(primitive, knows_goal)
+            for chosen in recorded.parts(np.flatnonzero(told == knows_goal), tasks.duration):
+                some = recorded.chosen(chosen)
+                durations = tasks.duration[chosen]
+                ticks = record_ticks(sensing, *some[:2], tasks.goal[chosen], durations, some.dts)
+                found.append((chosen, judge_recorded(expectation, standard, ticks, durations, some.dts)))
+        return found
+
     def left_out_maxima(self, member: Member, tasks: Sequence[Task]) -> FloatArray:
         """Largest value of every channel over each recording, judged by what the others teach: (K, C) array."""
         primitive = member.primitive
@@ -179,11 +208,10 @@ def _ticks(
     recordings: Sequence[Demonstration],
 ) -> list[tuple[FloatArray, FloatArray]]:
     """Path (T_k, S) and goal (D,) of each recording."""
-    pairs = zip(tasks, recordings, strict=True)
-    return [
-        ticks_of_recording(primitive, profile, task, recording.dt, array.signals(readings_of(array, recording)))
-        for task, recording in pairs
-    ]
+    stacked, recorded = stack_tasks(tasks), RecordedSignals.of(array, recordings)
+    sensing = Sensing(profile, primitive.signals.ranges, primitive.n_dof)
+    ticks = record_ticks(sensing, recorded.values, recorded.lengths, stacked.goal, stacked.duration, recorded.dts)
+    return [(path[:count], goal) for path, count, goal in zip(ticks.paths, ticks.counts, ticks.goals, strict=True)]
 
 
 def _observations(

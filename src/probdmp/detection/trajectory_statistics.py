@@ -13,9 +13,18 @@ import numpy as np
 from probdmp.checks import FloatArray, IntArray
 from probdmp.detection.path_model import PathModel
 from probdmp.detection.phase_clock import TICKS
+from probdmp.detection.window_maps import WindowInputs
 from probdmp.detection.windows import PathWindows
 
-__all__ = ["SHIFT_STD", "SLOPPINESS_DELAY", "Displacement", "Position", "relative_to_sloppiness", "sloppiness"]
+__all__ = [
+    "SHIFT_STD",
+    "SLOPPINESS_DELAY",
+    "Displacement",
+    "Position",
+    "relative_over_time",
+    "relative_to_sloppiness",
+    "sloppiness",
+]
 
 SHIFT_STD = 4.0
 """Ticks by which executions are ahead or behind."""
@@ -29,13 +38,25 @@ SLOPPINESS_DELAY = int(LAGS.max())
 """Ticks before a window is over that are not asked how sloppy the execution is."""
 
 
+START = np.zeros(1, dtype=np.int64)
+
+
 class Position:
     """Where an execution is."""
 
     offsets = np.zeros(1, dtype=np.int64)
 
     def __init__(self, model: PathModel) -> None:
-        self.windows = PathWindows(model, self.offsets, np.zeros(1, dtype=np.int64), TICKS + 1)
+        self.windows, self._dof = PathWindows(model, self.offsets, START, TICKS + 1), model.means.shape[1]
+
+    def weigh(self, inputs: WindowInputs, length: int) -> FloatArray:
+        """Squared distance at the first ticks, (length, n) array, of executions of which nothing is unseen."""
+        (squares,) = self.windows.squares(inputs, self.offsets, np.ones(1, dtype=np.int64), np.array([length]))
+        return squares[:, 0]
+
+    def look(self, tick: int, window: FloatArray) -> float:
+        """The same at one tick, of a window as in `WindowMaps.look`."""
+        return float(self.windows.maps.look(tick, window, START, len(window) - 1 - self._dof)[0, 0])
 
     def judge(self, ticks: IntArray, windows: FloatArray, means: FloatArray) -> FloatArray:
         """Squared distance at the ticks (T,) of windows (n, T, 1, D): (n, T) array."""
@@ -47,20 +68,34 @@ class Displacement:
     """How an execution has moved lately."""
 
     offsets = -np.append(LAGS[::-1], 0)
+    penalties = (DISPLACEMENT_SHIFTS / SHIFT_STD) ** 2
 
     def __init__(self, model: PathModel) -> None:
         differences = np.hstack([-np.eye(len(LAGS)), np.ones((len(LAGS), 1))])
+        self._dof = model.means.shape[1]
         n_places = TICKS + LAGS.max() + DISPLACEMENT_SHIFTS.max() + 1
         self.windows = PathWindows(model, self.offsets, DISPLACEMENT_SHIFTS, n_places, differences)
+
+    def weigh(self, inputs: WindowInputs, length: int) -> FloatArray:
+        """The same at the first ticks, (length, n) array, of executions of which nothing is unseen."""
+        (squares,) = self.windows.squares(inputs, self.offsets, np.array([len(LAGS)]), np.array([length]))
+        squares += self.penalties[:, None]
+        return squares.min(axis=1) / inputs.n_dof
+
+    def look(self, tick: int, window: FloatArray) -> float:
+        """The same at one tick, of a window as in `WindowMaps.look`."""
+        squares = self.windows.maps.look(tick, window, START, len(LAGS) * self._dof)[0]
+        squares += self.penalties
+        return float(squares.min()) / self._dof
 
     def judge(self, ticks: IntArray, windows: FloatArray, means: FloatArray) -> FloatArray:
         """Squared distance per degree of freedom, the least over shifts, of windows (n, T, P, D): (n, T) array."""
         white = self.windows.whiten(ticks, windows, means)
-        squares = (white.squares[..., -1] + (DISPLACEMENT_SHIFTS / SHIFT_STD) ** 2).min(axis=-1)
+        squares = (white.squares[..., -1] + self.penalties).min(axis=-1)
         return np.where(white.counts[..., 0, -1] > 0, squares / windows.shape[-1], np.nan)
 
 
-def sloppiness(total: FloatArray, count: FloatArray) -> FloatArray:
+def sloppiness(total: FloatArray | float, count: FloatArray | float) -> FloatArray:
     """About 1 for an ordinary execution.
 
     Parameters
@@ -72,8 +107,13 @@ def sloppiness(total: FloatArray, count: FloatArray) -> FloatArray:
 
 def relative_to_sloppiness(squares: FloatArray) -> FloatArray:
     """Squared displacements relative to those that the same execution had shown before the window, (n, T)."""
+    return relative_over_time(squares.T).T
+
+
+def relative_over_time(squares: FloatArray) -> FloatArray:
+    """The same of squared displacements (T, n)."""
     before = np.zeros((2, *squares.shape))
     seen = ~np.isnan(squares)
-    for sums, values in zip(before, (np.nan_to_num(squares), seen), strict=True):
-        sums[:, SLOPPINESS_DELAY:] = np.cumsum(values, axis=1)[:, :-SLOPPINESS_DELAY]
+    for sums, values in zip(before, (np.where(seen, squares, 0.0), seen), strict=True):
+        np.cumsum(values[:-SLOPPINESS_DELAY], axis=0, out=sums[SLOPPINESS_DELAY:])
     return squares / sloppiness(*before)

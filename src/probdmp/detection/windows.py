@@ -13,8 +13,14 @@ import numpy as np
 from probdmp.checks import FloatArray, IntArray
 from probdmp.detection.path_model import PathModel
 from probdmp.detection.phase_clock import TICKS
+from probdmp.detection.window_maps import WindowInputs, linear_maps
 
-__all__ = ["PathWindows", "WhiteWindows", "gather", "inverse_of_cholesky"]
+__all__ = ["PathWindows", "WhiteWindows", "gather", "inverse_of_cholesky", "whitened"]
+
+LOSSY_AT_ONCE = 64
+"""Windows of which something was not seen that are factorised at once."""
+SUBSTITUTED = 16
+"""Rows up to which a triangle is inverted row by row."""
 
 
 class WhiteWindows(NamedTuple):
@@ -34,15 +40,43 @@ def gather(paths: FloatArray, places: IntArray, offsets: IntArray) -> FloatArray
 
 
 def inverse_of_cholesky(covariances: FloatArray) -> FloatArray:
-    """L^-1 of positive definite matrices L L^T (…, n, n), by forward substitution on all of them at once."""
-    factors = np.linalg.cholesky(covariances)
-    inverses = np.zeros_like(covariances)
-    for i in range(covariances.shape[-1]):
+    """L^-1 of positive definite matrices L L^T (…, n, n), all of them at once."""
+    factors = np.asarray(np.linalg.cholesky(covariances), dtype=np.float64)
+    inverses = np.zeros_like(factors)
+    _invert_triangles(factors, inverses)
+    return inverses
+
+
+def whitened(covariances: FloatArray, residuals: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """L^-1 r of positive definite matrices L L^T (…, n, n) and residuals (…, n), and the logarithms of the diagonals of L.
+
+    One more row under the matrix makes the factorisation find it on its way: the last row of its factor is (L^-1 r)^T.
+    """
+    size = residuals.shape[-1]
+    bordered = np.empty((*residuals.shape[:-1], size + 1, size + 1))
+    bordered[..., :size, :size], bordered[..., size, :size] = covariances, residuals
+    bordered[..., :size, size], bordered[..., size, size] = residuals, np.finfo(np.float64).max / 4  # larger than any square
+    factors = np.linalg.cholesky(bordered)
+    diagonals = np.diagonal(factors, axis1=-2, axis2=-1)[..., :size]
+    return factors[..., size, :size], np.log(diagonals)
+
+
+def _invert_triangles(factors: FloatArray, inverses: FloatArray) -> None:
+    """Forward substitution in lower triangles (…, n, n); large ones by halves, which are matrix products."""
+    size = factors.shape[-1]
+    if size > SUBSTITUTED:
+        half = size // 2
+        first, second = slice(0, half), slice(half, size)
+        for part in (first, second):
+            _invert_triangles(factors[..., part, part], inverses[..., part, part])
+        coupled = np.matmul(factors[..., second, first], inverses[..., first, first])
+        np.negative(np.matmul(inverses[..., second, second], coupled), out=inverses[..., second, first])
+        return
+    for i in range(size):
         scale = 1 / factors[..., i, i]
         inverses[..., i, i] = scale
         above = np.matmul(factors[..., i, None, :i], inverses[..., :i, :i])[..., 0, :]
         inverses[..., i, :i] = -scale[..., None] * above
-    return inverses
 
 
 class PathWindows:
@@ -68,7 +102,17 @@ class PathWindows:
         n_ticks, self._dof = model.means.shape
         self._whole = model.covariance.reshape(n_ticks * self._dof, -1)
         self._noise = np.diag(np.tile(model.noise_variances, len(self.offsets)))
-        self._whitening = inverse_of_cholesky(self._covariances(self._ticks))
+        mix = np.eye(len(self.offsets)) if combination is None else combination
+        self._unmixed = np.kron(np.linalg.pinv(mix), np.eye(self._dof))
+        # A place at one shift is another place at another shift, but near the ends: each is factorised once.
+        ticks, of_each = np.unique(self._ticks.reshape(-1, len(self.offsets)), axis=0, return_inverse=True)
+        whitening = inverse_of_cholesky(self._covariances(ticks))
+        if combination is not None:
+            whitening = whitening @ np.kron(mix, np.eye(self._dof))
+        means = model.means[ticks].reshape(len(ticks), -1)
+        gains = model.goal_gains[ticks].reshape(*means.shape, -1)
+        signals = np.tile(np.arange(self._dof), len(self.offsets))
+        self.maps = linear_maps(whitening, means, gains, signals, of_each.reshape(self._ticks.shape[:2]))
 
     def _covariances(self, ticks: IntArray) -> FloatArray:
         """Of windows at ticks (…, S, P) of the movement, noise included: (…, S, L D, L D) array."""
@@ -78,6 +122,29 @@ class PathWindows:
             return covariances
         combination = np.kron(self._combination, np.eye(self._dof))
         return np.asarray(combination @ covariances @ combination.T)
+
+    @property
+    def log_determinants(self) -> FloatArray:
+        """ln det L^-1 of the points up to each one, of windows of which all was seen: (T, S, P); without a combination."""
+        maps, outputs = self.maps.maps, np.arange(self.maps.maps.shape[1])
+        diagonal = np.log(np.moveaxis(maps[:, outputs, :, outputs - len(outputs)], 0, -1))  # (T, S, P D)
+        return np.asarray(np.cumsum(diagonal.reshape(*diagonal.shape[:2], -1, self._dof).sum(axis=-1), axis=-1))
+
+    def squares(self, inputs: WindowInputs, offsets: IntArray, points: IntArray, wanted: IntArray) -> list[FloatArray]:
+        """Squared Mahalanobis distances of the first points of windows at the first places, of executions side by side.
+
+        Parameters
+        ----------
+        offsets : (P) ticks at which the points of a window are seen, relative to its place.
+        inputs : of D signals or more, of which the first D are meant; what was not seen counts as zero.
+        points : (J) increasing: distances of so many points are asked for.
+        wanted : (J) at how many places each of them is; not increasing.
+
+        Returns
+        -------
+        J arrays (wanted, S, n).
+        """
+        return self.maps.squares(inputs, np.repeat(offsets, self._dof), points * self._dof, wanted)
 
     def whiten(self, places: IntArray, windows: FloatArray, means: FloatArray) -> WhiteWindows:
         """Compare windows with the model.
@@ -94,13 +161,15 @@ class PathWindows:
         points, dof = residuals.shape[-2:]
         size = points * dof
         flat = residuals.reshape(*residuals.shape[:3], size)
-        whitening = self._whitening[rows][..., :size, :size]
+        whitening = self._whitening(rows)[..., :size, :size]
         # (T, S, n, size): matrix products are far faster than sums over indices
         white = np.moveaxis(np.matmul(whitening, np.moveaxis(np.nan_to_num(flat), 0, -1)), -1, 0)
         diagonal = np.broadcast_to(np.log(np.diagonal(whitening, axis1=-2, axis2=-1)), flat.shape).copy()
         seen = ~np.isnan(flat)
-        for n, t in np.argwhere(~seen.all(axis=(2, 3))):
-            white[n, t], diagonal[n, t] = self._without_unseen(rows[t], flat[n, t], size)
+        lossy = np.argwhere(~seen.all(axis=(2, 3)))
+        for begin in range(0, len(lossy), LOSSY_AT_ONCE):
+            n, t = lossy[begin : begin + LOSSY_AT_ONCE].T
+            white[n, t], diagonal[n, t] = self._without_unseen(rows[t], flat[n, t])
         shape = (*flat.shape[:3], points, dof)
         sums = [np.cumsum(x.reshape(shape).sum(axis=-1), axis=-1) for x in (white**2, diagonal, seen)]
         return WhiteWindows(*sums)
@@ -111,31 +180,50 @@ class PathWindows:
         The sign is that of the deviation of the last point; the magnitudes add up to the squared distance, or nearly so where
         shares of different signs cancel.
         """
-        rows = np.minimum(np.array([place]), len(self._ticks) - 1)
-        residuals = np.nan_to_num(self._residuals(rows, window[None, None], mean[None])[0, 0, shift])
-        size = residuals.size
-        whitening = self._whitening[rows[0], shift, :size, :size]
-        weighed = (whitening.T @ (whitening @ residuals.ravel())).reshape(residuals.shape)
-        return np.abs((residuals * weighed).sum(axis=0)) * np.sign(residuals[-1])
+        ticks = self.ticks(np.array([place]), shift)
+        return self.shares(np.array([place]), shift, window[None] - mean[ticks])[0]
+
+    def ticks(self, places: IntArray, shift: int) -> IntArray:
+        """Of the model, at which windows at places (n,) should be: (n, P) array."""
+        return np.asarray(self._ticks[np.minimum(places, len(self._ticks) - 1), shift])
+
+    def shares(self, places: IntArray, shift: int, deviations: FloatArray) -> FloatArray:
+        """The contributions in n windows at places (n,), that are (n, P, D) from their means: (n, D) array."""
+        compared = np.nan_to_num(self._compared(deviations))
+        rows, first = np.minimum(places, len(self._ticks) - 1), -len(self.maps.signals)
+        whitening = self.maps.maps[rows, :, shift, first:]
+        if self._combination is not None:
+            whitening = np.matmul(whitening, self._unmixed)
+        flat = compared.reshape(len(rows), -1, 1)
+        weighed = np.matmul(whitening.mT, np.matmul(whitening, flat)).reshape(compared.shape)
+        return np.abs((compared * weighed).sum(axis=1)) * np.sign(compared[:, -1])
+
+    def _whitening(self, rows: IntArray) -> FloatArray:
+        """L^-1 of what is compared at places, (T, S, L D, L D)."""
+        maps = self.maps.maps[rows].swapaxes(1, 2)[..., -len(self.maps.signals) :]
+        return maps if self._combination is None else np.matmul(maps, self._unmixed)
 
     def _residuals(self, rows: IntArray, windows: FloatArray, means: FloatArray) -> FloatArray:
         """What is compared minus its mean at each shift, (n, T, S, L, D)."""
         points = windows.shape[2]
         deviations = np.asarray(windows[:, :, None] - means[:, self._ticks[rows][..., :points]])  # (n, T, S, P, D)
+        return self._compared(deviations)
+
+    def _compared(self, deviations: FloatArray) -> FloatArray:
+        """Of points (…, P, D), what is compared: (…, L, D), NaN where a point was not seen."""
         if self._combination is None:
             return deviations
-        if not np.isnan(windows).any():
+        unseen = np.isnan(deviations)
+        if not unseen.any():
             return np.asarray(np.matmul(self._combination, deviations))
-        unseen = np.matmul(np.abs(self._combination), np.isnan(deviations)) > 0
-        return np.where(unseen, np.nan, np.matmul(self._combination, np.nan_to_num(deviations)))
+        lost = np.matmul(np.abs(self._combination), unseen) > 0
+        return np.where(lost, np.nan, np.matmul(self._combination, np.where(unseen, 0.0, deviations)))
 
-    def _without_unseen(self, row: int, residuals: FloatArray, size: int) -> tuple[FloatArray, FloatArray]:
-        """What was seen of a window whitened by itself: z and the logarithms of the diagonal, (S, size), zero elsewhere."""
-        seen = ~np.isnan(residuals[0])
-        white, diagonal = np.zeros((2, len(self.shifts), size))
-        if seen.any():
-            covariances = self._covariances(self._ticks[row])[:, :size, :size][:, seen][:, :, seen]
-            inverse = inverse_of_cholesky(covariances)
-            white[:, seen] = np.matmul(inverse, residuals[:, seen][..., None])[..., 0]
-            diagonal[:, seen] = np.log(np.diagonal(inverse, axis1=-2, axis2=-1))
-        return white, diagonal
+    def _without_unseen(self, rows: IntArray, residuals: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """What was seen of windows (W, S, size) whitened by itself: z and the logarithms of the diagonal, zero elsewhere."""
+        size, seen = residuals.shape[-1], ~np.isnan(residuals)
+        covariances = self._covariances(self._ticks[rows])[..., :size, :size]
+        # What was not seen is given a variance of its own and a deviation of zero, which says nothing of the rest.
+        covariances = np.where(seen[..., None] & seen[..., None, :], covariances, np.eye(size))
+        white, logarithms = whitened(covariances, np.where(seen, residuals, 0.0))
+        return white, -logarithms

@@ -1,0 +1,199 @@
+"""Verdicts on recorded executions side by side: what a `CalibratedMonitor` would say in the end of each of them.
+
+Few executions are suspicious. Of the others only the moment is looked for at which they come nearest to an alarm: surprise
+grows with the value of a channel, so the largest values say how large it gets, and what is smaller by far is not looked at.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from probdmp.checks import BoolArray, FloatArray, IntArray
+from probdmp.detection.calibrated_monitor import LOOKED_AT_AGAIN
+from probdmp.detection.calibration import Calibration
+from probdmp.detection.expectation import Expectation
+from probdmp.detection.reasons import LOOKED_BACK, REMEMBERED, better_fit, reason_for, signal_shares
+from probdmp.detection.recorded_sensors import NEVER
+from probdmp.detection.recorded_ticks import RecordedTicks
+from probdmp.detection.sensor_watch import CAUSES
+from probdmp.detection.verdict import Verdict
+from probdmp.dmp.phase import phases_at
+
+__all__ = ["Standard", "Verdicts", "joined", "judge_recorded"]
+
+TIE = 1e-12
+"""Relative difference up to which surprises are the same."""
+
+
+class Standard(NamedTuple):
+    """What executions of a primitive are held to."""
+
+    calibration: Calibration
+    threshold: float
+    persistence: int
+    channels: tuple[str, ...]
+    """(C) names."""
+
+
+class Verdicts(NamedTuple):
+    """Verdicts on N executions; fields as of `probdmp.detection.verdict.Verdict`."""
+
+    failed: BoolArray
+    steps: IntArray
+    times: FloatArray
+    phases: FloatArray
+    test_ratios: FloatArray
+    contributions: FloatArray
+    """(N, W) array."""
+    kinds: NDArray[np.object_]
+    causes: NDArray[np.object_]
+    channels: NDArray[np.object_]
+    betters: NDArray[np.object_]
+    is_stale: BoolArray
+    has_sensor_fault: BoolArray
+
+    def verdict(self, k: int, names: tuple[str, ...]) -> Verdict:
+        """On one of them."""
+        numbers = int(self.steps[k]), float(self.times[k]), float(self.phases[k]), float(self.test_ratios[k])
+        texts = self.kinds[k], self.causes[k], self.channels[k], self.betters[k]
+        flags = bool(self.is_stale[k]), bool(self.has_sensor_fault[k])
+        return Verdict(bool(self.failed[k]), *numbers, np.array(self.contributions[k]), names, *texts, *flags)
+
+
+def joined(parts: Sequence[tuple[IntArray, Verdicts]]) -> Verdicts:
+    """Judgements of parts of the executions, each with the numbers of these, as one in their order."""
+    order = np.argsort(np.concatenate([rows for rows, _ in parts]))
+    return Verdicts(*(np.concatenate(values)[order] for values in zip(*(one for _, one in parts), strict=True)))
+
+
+class _Moments(NamedTuple):
+    """One moment of each of N executions, at a tick."""
+
+    ticks: IntArray
+    """(N,) array; -1 where nothing is surprising."""
+    channels: IntArray
+    """(N,) array: the one that is most surprising."""
+    ratios: FloatArray
+    """(N,) array."""
+    is_alarm: BoolArray
+    """(N,) array: whether the ratio has been above 1 for long enough; else it is the largest one."""
+
+
+def judge_recorded(
+    expectation: Expectation, standard: Standard, recorded: RecordedTicks, durations: FloatArray, dts: FloatArray
+) -> Verdicts:
+    """Judge N executions on the phase clock.
+
+    Parameters
+    ----------
+    durations, dts : (N,) arrays, seconds.
+    """
+    paths, sensors, n = recorded.paths, recorded.sensors, len(recorded.paths)
+    values = expectation.trajectory.values_side_by_side(paths.transpose(1, 2, 0), recorded.goals)
+    if np.any(recorded.counts < paths.shape[1]):
+        values[:, np.arange(paths.shape[1])[:, None] >= recorded.counts] = np.nan
+    moments = _moments(standard, values)
+    rows, at = np.arange(n), np.maximum(moments.ticks, 0)
+    alarmed_at = np.where(moments.is_alarm, recorded.steps[rows, at], NEVER)
+    by_tick = moments.is_alarm & (alarmed_at <= np.minimum(sensors.faulty_from, sensors.stale_from))
+    by_sensor = ~by_tick & (sensors.faulty_from < NEVER) & (sensors.faulty_from <= sensors.stale_from)
+    by_silence = ~by_tick & ~by_sensor & (sensors.stale_from < NEVER)
+    at_tick = ~by_sensor & ~by_silence & (moments.ticks >= 0)
+    cases = [at_tick, by_sensor, by_silence]
+    steps = np.select(cases, [recorded.steps[rows, at], sensors.faulty_from, sensors.stale_from], 0)
+    contributions = np.zeros((n, len(expectation.watched)))
+    contributions[at_tick, : paths.shape[2]] = _shares(expectation, recorded, values, moments, np.flatnonzero(at_tick))
+    contributions[by_sensor, : paths.shape[2]] = sensors.fault_shares[by_sensor]
+    channels = np.array([*standard.channels, "sensor", "silence", ""], dtype=object)
+    which = np.select(cases, [moments.channels, len(channels) - 3, len(channels) - 2], len(channels) - 1)
+    kinds, causes, betters = _reasons(expectation, recorded, moments, by_tick, by_silence, durations)
+    return Verdicts(
+        by_tick | by_sensor | by_silence,
+        steps,
+        steps * dts,
+        np.where(at_tick | by_sensor | by_silence, phases_at(steps * dts, durations), 1.0),
+        np.select(cases, [moments.ratios, sensors.fault_ratios, sensors.staleness], 0.0),
+        contributions,
+        *(kinds, causes, channels[which], betters),
+        sensors.is_stale,
+        sensors.faulty_from < NEVER,
+    )
+
+
+def _moments(standard: Standard, values: FloatArray) -> _Moments:
+    """The first alarm of each execution, or where it comes nearest to one, by values (C, T, N)."""
+    calibration, (n_channels, _, n) = standard.calibration, values.shape
+    largest = calibration.surprise(np.fmax.reduce(values, axis=1).T).max(axis=-1)
+    nothing = np.zeros(n, dtype=np.int64)
+    moments = _Moments(nothing, nothing.copy(), largest / standard.threshold, np.zeros(n, dtype=np.bool_))
+    suspects = np.flatnonzero(moments.ratios > 1)
+    least = np.where(largest > 0, calibration.least_values(largest).T, np.inf)
+    least[:, suspects] = np.inf
+    first = np.full(n, NEVER)  # by tick, then by channel
+    for channel in range(n_channels):
+        ticks, k = np.nonzero(values[channel] >= least[channel])
+        is_largest = calibration.surprise_of(channel, values[channel, ticks, k]) >= largest[k] * (1 - TIE)
+        np.minimum.at(first, k[is_largest], ticks[is_largest] * n_channels + channel)
+    moments.ticks[:] = np.where(first < NEVER, first // n_channels, -1)
+    moments.channels[:] = np.where(first < NEVER, first % n_channels, 0)
+    for of_all, some in zip(moments, _alarms(standard, values[:, :, suspects]), strict=True):
+        of_all[suspects] = some
+    return moments
+
+
+def _alarms(standard: Standard, values: FloatArray) -> _Moments:
+    """The same of executions that are above the threshold at some tick, every tick looked at."""
+    surprises = standard.calibration.surprise(values.transpose(2, 1, 0))
+    ratios = surprises.max(axis=-1) / standard.threshold
+    ticks, rows = np.arange(ratios.shape[1]), np.arange(len(ratios))
+    below = np.maximum.accumulate(np.where(ratios > 1, -1, ticks), axis=1)  # the last tick that was not above
+    alarmed = ticks - below >= standard.persistence
+    is_alarm = np.asarray(alarmed.any(axis=1))
+    at = np.where(is_alarm, np.argmax(alarmed, axis=1), np.argmax(ratios, axis=1))
+    return _Moments(at, np.argmax(surprises[rows, at], axis=1), ratios[rows, at], is_alarm)
+
+
+def _shares(
+    expectation: Expectation, recorded: RecordedTicks, values: FloatArray, moments: _Moments, chosen: IntArray
+) -> FloatArray:
+    """Contributions of the signals to what was noticed of the chosen executions, (n, S) array."""
+    channels, ticks = moments.channels[chosen], _shown(recorded.steps[chosen], moments.ticks[chosen])
+
+    def windows(some: IntArray, offsets: IntArray) -> FloatArray:
+        return recorded.paths[chosen[some, None], np.maximum(ticks[some, None] + offsets, 0)]
+
+    there = values[channels, ticks, chosen]
+    return signal_shares(expectation.trajectory, channels, ticks, there, recorded.goals[chosen], windows)
+
+
+def _shown(steps: IntArray, ticks: IntArray) -> IntArray:
+    """The last ticks (n,) that come out with the same sample as these, by steps (n, K): a monitor has seen all of them."""
+    return np.asarray((steps <= steps[np.arange(len(steps)), ticks][:, None]).sum(axis=1) - 1)
+
+
+def _reasons(
+    expectation: Expectation,
+    recorded: RecordedTicks,
+    moments: _Moments,
+    by_tick: BoolArray,
+    by_silence: BoolArray,
+    durations: FloatArray,
+) -> NDArray[np.object_]:
+    """Kind, cause and better-fitting primitive of every execution, (3, N) array of text."""
+    texts = np.full((3, len(by_tick)), "", dtype=object)
+    texts[0, by_silence], texts[1, by_silence] = "data missing", "nothing measured"
+    is_faulty = recorded.sensors.faulty_from < NEVER
+    texts[0, is_faulty], texts[1, is_faulty] = "sensor", [CAUSES[c] for c in recorded.sensors.causes[is_faulty]]
+    d = expectation.primitive.n_dof
+    for k in np.flatnonzero(by_tick & ~is_faulty):
+        alarm, path = moments.ticks[k], recorded.paths[k, : recorded.counts[k], :d]
+        since = max(later for later in LOOKED_AT_AGAIN if alarm + later < len(path))
+        now = int(_shown(recorded.steps[k : k + 1], alarm + since)[0])
+        means = expectation.trajectory.model.means_for(recorded.goals[k : k + 1])[0]
+        recent = path[max(now + 1 - LOOKED_BACK, 0) : now + 1]
+        kind, cause = reason_for(expectation, means, list(recent), now, int(moments.channels[k]), since)
+        better = better_fit(expectation, path[: min(now, REMEMBERED) + 1], float(durations[k])) if kind == "motion" else ""
+        texts[:, k] = kind, cause, better
+    return texts

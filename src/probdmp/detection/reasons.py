@@ -1,0 +1,87 @@
+"""Who is to blame for what a channel has noticed, and why it did: the same while an execution runs and of recordings."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from probdmp.checks import FloatArray, IntArray
+from probdmp.detection.diagnosis import LOOKED_AT, Diagnosis, diagnose
+from probdmp.detection.expectation import Expectation
+from probdmp.detection.innovation_watch import watched_sensors
+from probdmp.detection.phase_clock import TICKS
+from probdmp.detection.trajectory_model import MOVEMENT_CHANNELS, TrajectoryModel
+
+__all__ = ["LOOKED_BACK", "REMEMBERED", "better_fit", "reason_for", "signal_shares"]
+
+LOOKED_BACK = int(LOOKED_AT.max()) + 1
+REMEMBERED = 2 * TICKS
+"""Ticks from the start that are compared with other primitives."""
+LATE = ("held", "paused", "slow")
+"""Causes of a diagnosis by which a movement is late: then its channels are so too."""
+
+Windows = Callable[[IntArray, IntArray], FloatArray]
+"""Of some of the executions, by number, at the ticks that are asked about: at (P) offsets from them, (n, P, S)."""
+
+
+def signal_shares(
+    trajectory: TrajectoryModel, channels: IntArray, ticks: IntArray, values: FloatArray, goals: FloatArray, windows: Windows
+) -> FloatArray:
+    """(n, S) array: how much each signal of n executions contributes to what channels say at ticks, with its sign.
+
+    It is by where the execution is, or else by how it has moved lately; or by what the channel reads.
+
+    Parameters
+    ----------
+    channels, ticks, values : (n,) arrays: one moment of each execution, and the value there.
+    goals : (n, D) array, as displacements; NaN where not told.
+    """
+    d, n_movement = trajectory.model.means.shape[1], len(MOVEMENT_CHANNELS)
+    shares = np.zeros((len(channels), d + len(trajectory.feel)))
+    position = MOVEMENT_CHANNELS.index("position")
+    for statistic, chosen in (
+        (trajectory.position, channels == position),
+        (trajectory.displacement, (channels != position) & (channels < n_movement)),
+    ):
+        some, judge = np.flatnonzero(chosen), statistic.windows
+        if len(some):
+            unshifted = int(np.flatnonzero(judge.shifts == 0)[0])
+            means = trajectory.model.means_at(judge.ticks(ticks[some], unshifted), goals[some])
+            deviations = windows(some, statistic.offsets)[..., :d] - means
+            shares[some, :d] = judge.shares(ticks[some], unshifted, deviations)
+    for k, feel in enumerate(trajectory.feel):
+        some = np.flatnonzero(channels == n_movement + k)
+        if len(some):
+            expected = trajectory.means_at(np.clip(ticks[some, None] + feel.offsets, 0, TICKS), goals[some])
+            signs = feel.signs(ticks[some], windows(some, feel.offsets), expected)
+            shares[some, d + k] = np.nan_to_num(values[some]) * signs
+    return shares
+
+
+def reason_for(
+    expectation: Expectation, means: FloatArray, recent: Sequence[FloatArray], tick: int, channel: int, seen_since: int
+) -> Diagnosis:
+    """From the last ticks; what a channel has noticed is about that channel, unless the movement is late.
+
+    Parameters
+    ----------
+    means : (M, D) array, mean path of the execution.
+    recent : displacements (D,) at the last ticks, `LOOKED_BACK` of them at the most.
+    tick : the last of them, since the start.
+    seen_since : ticks since the channel has raised the alarm.
+    """
+    primitive, array = expectation.primitive, expectation.array
+    further = channel - len(MOVEMENT_CHANNELS)
+    noise = expectation.profile.noise_stds[: primitive.n_dof] / primitive.ranges
+    found = diagnose(expectation.trajectory.model, means, recent, tick, noise, seen_since)
+    if further < 0 or found.cause in LATE:
+        return found
+    if further >= len(primitive.channel_names):
+        sensor = watched_sensors(array)[further - len(primitive.channel_names)]
+        return Diagnosis("motion", f"unexpected readings of {sensor}")
+    return Diagnosis("channel", f"unexpected {primitive.channel_names[further]}")
+
+
+def better_fit(expectation: Expectation, path: FloatArray, duration: float) -> str:
+    """Label of the primitive of the library that fits a path from the start (T, D) better, if there is one."""
+    times = np.arange(len(path)) * duration / TICKS
+    return expectation.others.better(expectation.primitive, times, path * expectation.primitive.ranges)
