@@ -197,6 +197,75 @@ def test_series_are_smoothed_alike(arguments, seed):
     assert_same(ours, plain)
 
 
+@st.composite
+def windows(draw):
+    """Values, rows, maps, ends, reach and wanted, as the kernels take them."""
+    rng = np.random.default_rng(draw(seeds))
+    n, n_values, n_places, n_maps = (draw(st.integers(1, most)) for most in (40, 30, 12, 12))
+    n_outputs, n_accounts, n_inputs = (draw(st.integers(1, most)) for most in (9, 5, 12))
+    ends = np.unique(rng.integers(1, n_outputs + 1, draw(st.integers(1, 4))))
+    wanted = np.sort(rng.integers(0, n_places + 1, len(ends)))[::-1].copy()
+    reach = np.maximum.accumulate(rng.integers(1, n_inputs + 1, n_outputs))
+    maps = rng.normal(size=(n_maps, n_outputs, n_accounts, n_inputs))
+    maps *= (np.arange(n_inputs) < reach[:, None])[:, None]
+    rows = rng.integers(0, n_values, (n_places, n_inputs))
+    return rng.normal(size=(n_values, n)), rows, maps, ends, reach, wanted
+
+
+def squared(module, arguments):
+    found = np.full(int(arguments[5].sum()) * arguments[2].shape[2] * arguments[0].shape[1], -7.0)
+    module.whitened_squares(*arguments, found)
+    return found
+
+
+@given(windows())
+def test_squares_of_windows_are_those_of_each_by_itself(arguments):
+    values, rows, maps, ends, _, wanted = arguments
+    expected = []
+    for end, count in zip(ends, wanted, strict=True):
+        for place in range(count):
+            white = maps[min(place, len(maps) - 1), :end] @ values[rows[place]]
+            expected.append(np.sum(white**2, axis=0).ravel())
+    expected = np.concatenate(expected) if expected else np.empty(0)
+    for module in {_kernels_numpy, _compiled() if kernels.COMPILED else _kernels_numpy}:
+        assert_same(squared(module, arguments), expected)
+
+
+@given(seeds, st.integers(0, 6), st.integers(1, 8), st.integers(1, 40), st.integers(1, 40))
+def test_mixtures_are_sums_of_densities(seed, n_places, n_accounts, n, n_halves):
+    rng = np.random.default_rng(seed)
+    squares, scales = rng.exponential(size=(n_places, n_accounts, n)) * 30, np.exp(rng.normal(size=(n_places, n_accounts)))
+    expected = np.log(np.sum((scales[..., None] * (1 + squares / 4)) ** (-n_halves / 2), axis=1))
+    for module in {_kernels_numpy, _compiled() if kernels.COMPILED else _kernels_numpy}:
+        mixed = np.full((n_places, n), -7.0)
+        module.log_mixtures(squares, scales, mixed, n_halves, 4.0)
+        assert_same(mixed, expected)
+
+
+@needs_extension
+@pytest.mark.parametrize("fault", ["rows", "negative rows", "ends", "reach", "wanted", "found"])
+def test_windows_that_are_not_there_are_refused(fault):
+    values, maps = np.ones((5, 3)), np.ones((2, 4, 1, 2))
+    rows, ends, reach = np.zeros((6, 2), dtype=np.int64), np.array([2, 4]), np.array([1, 1, 2, 2])
+    wanted = np.array([6, 3])
+    found = np.empty(9 * 3)
+    _compiled().whitened_squares(values, rows, maps, ends, reach, wanted, found)
+    if fault == "rows":
+        rows[3, 1] = 5
+    elif fault == "negative rows":
+        rows[3, 1] = -1
+    elif fault == "ends":
+        ends[1] = 5
+    elif fault == "reach":
+        reach[0] = 3
+    elif fault == "wanted":
+        wanted[0], found = 7, np.empty(10 * 3)
+    else:
+        found = np.empty(8 * 3)
+    with pytest.raises(ValueError, match="do not belong together"):
+        _compiled().whitened_squares(values, rows, maps, ends, reach, wanted, found)
+
+
 @needs_extension
 @pytest.mark.parametrize("fault", ["dtype", "axes", "shape", "order", "count", "object", "read-only"])
 def test_arrays_that_do_not_fit_are_refused(fault):

@@ -18,9 +18,9 @@ from probdmp.checks import FloatArray, IntArray
 from probdmp.detection.path_model import PathModel
 from probdmp.detection.phase_clock import TICKS
 from probdmp.detection.trajectory_statistics import SHIFT_STD
-from probdmp.detection.window_kernels import log_mixtures
 from probdmp.detection.window_maps import WindowInputs, WindowMaps
 from probdmp.detection.windows import PathWindows, inverse_of_cholesky
+from probdmp.gaussian import kernels
 
 __all__ = ["DEGREES_OF_FREEDOM", "EVIDENCE", "Evidence", "Foreseen", "Pace", "Standstill"]
 
@@ -71,13 +71,13 @@ class Foreseen:
         -------
         J arrays (wanted, n).
         """
-        squares = self._windows.squares(inputs, offsets, points, wanted)
-        return [
-            log_mixtures(
-                some, self._bases[: len(some), :, n - 1], int(DEGREES_OF_FREEDOM) + int(n) * self._dof, DEGREES_OF_FREEDOM
-            )
-            for some, n in zip(squares, points, strict=True)
-        ]
+        squares, mixtures = self._windows.squares(inputs, offsets, points, wanted), []
+        for some, n in zip(squares, points.tolist(), strict=True):
+            bases = np.ascontiguousarray(self._bases[: len(some), :, n - 1])
+            mixed = np.empty((len(some), some.shape[2]))
+            kernels.log_mixtures(some, bases, mixed, int(DEGREES_OF_FREEDOM) + n * self._dof, DEGREES_OF_FREEDOM)
+            mixtures.append(mixed)
+        return mixtures
 
     def looks(self, points: IntArray, places: IntArray) -> "Looks":
         """Ready to be asked about the first points and all points of single executions.

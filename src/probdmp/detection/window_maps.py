@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from probdmp.checks import FloatArray, IntArray
-from probdmp.detection.window_kernels import whitened_squares
+from probdmp.gaussian import kernels
 
 __all__ = ["WindowInputs", "WindowMaps", "linear_maps"]
 
@@ -80,7 +80,10 @@ class WindowMaps:
         offsets : (E) tick at which each number of a window is seen, relative to the place.
         """
         rows = inputs.rows(int(wanted[0]), offsets, self.signals)
-        return whitened_squares(inputs.values, rows, self.maps, ends, self.reach[ends - 1], wanted)
+        n_accounts, n = self.maps.shape[2], inputs.values.shape[1]
+        found = np.empty(int(wanted.sum()) * n_accounts * n)
+        kernels.whitened_squares(inputs.values, rows, self.maps, ends, self.reach, wanted, found)
+        return kernels.split_sums(found, wanted, n_accounts, n)
 
 
 def linear_maps(whitening: FloatArray, means: FloatArray, gains: FloatArray, signals: IntArray, which: IntArray) -> WindowMaps:

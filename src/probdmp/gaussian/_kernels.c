@@ -1,4 +1,4 @@
-/* Kalman filtering of many scalar-observation systems: the loops of probdmp.gaussian, compiled.
+/* Kalman filtering of many scalar-observation systems, and likelihoods of many windows: the loops of probdmp, compiled.
 
    s[t] = A s[t-1] + drift[t-1] + b e[t-1],  e ~ N(0, u[t-1]),    o[t] = c s[t] + v[t],  v ~ N(0, r)
 
@@ -13,6 +13,7 @@
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
 #include <math.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -33,11 +34,13 @@ typedef struct {
     const char *name;
     int is_output;
     int ndim;
+    int is_integer;
 } Spec;
 
 typedef struct {
     Py_buffer view;
     double *data;
+    const int64_t *integers;
 } Array;
 
 static void release(Array *arrays, int count)
@@ -45,7 +48,7 @@ static void release(Array *arrays, int count)
     for (int i = 0; i < count; i++) PyBuffer_Release(&arrays[i].view);
 }
 
-/* All arguments as arrays of float64 with the number of axes that the specs say. */
+/* All arguments as arrays of the kind, and with the number of axes, that the specs say. */
 static int take(PyObject *const *arguments, Py_ssize_t given, const Spec *specs, int count, Array *arrays)
 {
     if (given != count) {
@@ -59,13 +62,16 @@ static int take(PyObject *const *arguments, Py_ssize_t given, const Spec *specs,
             return -1;
         }
         const Py_buffer *view = &arrays[i].view;
-        if (view->ndim != specs[i].ndim || view->itemsize != sizeof(double) || !view->format || strcmp(view->format, "d")) {
-            PyErr_Format(PyExc_ValueError, "%s: expected float64 with %d axes, got %d axes of format %s", specs[i].name,
-                         specs[i].ndim, view->ndim, view->format ? view->format : "B");
+        const char *format = view->format ? view->format : "B";
+        const int is_kind = specs[i].is_integer ? !strcmp(format, "l") || !strcmp(format, "q") : !strcmp(format, "d");
+        if (view->ndim != specs[i].ndim || view->itemsize != 8 || !is_kind) {
+            PyErr_Format(PyExc_ValueError, "%s: expected %s with %d axes, got %d axes of format %s", specs[i].name,
+                         specs[i].is_integer ? "int64" : "float64", specs[i].ndim, view->ndim, format);
             release(arrays, i + 1);
             return -1;
         }
         arrays[i].data = view->buf;
+        arrays[i].integers = view->buf;
     }
     return 0;
 }
@@ -134,6 +140,13 @@ typedef struct {
     const double *closed, *feedback, *sensor, *precisions, *observed, *paths;
 } Series;
 
+/* Windows of n executions, each after linear maps of its own place. */
+typedef struct {
+    Py_ssize_t n, n_values, n_places, n_inputs, n_maps, n_outputs, n_accounts, n_sums;
+    const double *values, *maps;
+    const int64_t *rows, *ends, *reach, *wanted;
+} Windows;
+
 /* ---- Loops, for any processor and for AVX2 ------------------------------------------------------------------------------ */
 
 /* Each of them has two names. */
@@ -158,6 +171,11 @@ typedef struct {
 #define score_all NAMED(score_all)
 #define smooth_all NAMED(smooth_all)
 
+#define square_outputs NAMED(square_outputs)
+#define look_at_windows NAMED(look_at_windows)
+#define mix_lane NAMED(mix_lane)
+#define mix_all NAMED(mix_all)
+
 #define NAMED(name) name##_anywhere
 #include "_kernels.c"
 #undef NAMED
@@ -177,6 +195,8 @@ static void look_at_processor(void) { has_avx2 = __builtin_cpu_supports("avx2") 
 static void look_at_processor(void) {}
 #endif
 #undef filter_all
+#undef look_at_windows
+#undef mix_all
 #undef step_all
 #undef score_all
 #undef smooth_all
@@ -186,10 +206,10 @@ static void look_at_processor(void) {}
 static PyObject *filter_systems(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
 {
     static const Spec specs[] = {
-        {"transition", 0, 3}, {"input_vector", 0, 2}, {"drifts", 0, 3}, {"input_variances", 0, 2},
-        {"sensor", 0, 2}, {"noise", 0, 1}, {"initial_mean", 0, 2}, {"initial_covariance", 0, 3},
-        {"observations", 0, 2}, {"means", 1, 3}, {"covariances", 1, 4}, {"innovations", 1, 2},
-        {"variances", 1, 2}, {"log_likelihoods", 1, 2}, {"gains", 1, 3},
+        {"transition", 0, 3, 0}, {"input_vector", 0, 2, 0}, {"drifts", 0, 3, 0}, {"input_variances", 0, 2, 0},
+        {"sensor", 0, 2, 0}, {"noise", 0, 1, 0}, {"initial_mean", 0, 2, 0}, {"initial_covariance", 0, 3, 0},
+        {"observations", 0, 2, 0}, {"means", 1, 3, 0}, {"covariances", 1, 4, 0}, {"innovations", 1, 2, 0},
+        {"variances", 1, 2, 0}, {"log_likelihoods", 1, 2, 0}, {"gains", 1, 3, 0},
     };
     enum { COUNT = sizeof(specs) / sizeof(specs[0]) };
     Array x[COUNT];
@@ -219,7 +239,7 @@ static PyObject *filter_systems(PyObject *module, PyObject *const *arguments, Py
 static PyObject *filter_step(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
 {
     static const Spec specs[] = {
-        {"system", 0, 2}, {"inputs", 0, 3}, {"observation", 0, 1}, {"before", 0, 2}, {"after", 1, 2},
+        {"system", 0, 2, 0}, {"inputs", 0, 3, 0}, {"observation", 0, 1, 0}, {"before", 0, 2, 0}, {"after", 1, 2, 0},
     };
     enum { COUNT = sizeof(specs) / sizeof(specs[0]) };
     Array x[COUNT];
@@ -265,12 +285,12 @@ static int series_fit(const Array *x, Series *s, Py_ssize_t *n_states)
            && agree(&x[5], "paths", n_paths == 1 ? 1 : count, t, d, 0);
 }
 
-#define SERIES {"closed_loop", 0, 4}, {"feedback", 0, 3}, {"sensor", 0, 2}, {"precisions", 0, 2}, {"observations", 0, 3}, \
-               {"paths", 0, 3}
+#define SERIES {"closed_loop", 0, 4, 0}, {"feedback", 0, 3, 0}, {"sensor", 0, 2, 0}, {"precisions", 0, 2, 0}, {"observations", 0, 3, 0}, \
+               {"paths", 0, 3, 0}
 
 static PyObject *squared_innovations(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
 {
-    static const Spec specs[] = {SERIES, {"squares", 1, 2}};
+    static const Spec specs[] = {SERIES, {"squares", 1, 2, 0}};
     enum { COUNT = sizeof(specs) / sizeof(specs[0]) };
     Array x[COUNT];
     Series s;
@@ -296,7 +316,7 @@ static PyObject *squared_innovations(PyObject *module, PyObject *const *argument
 
 static PyObject *smoothed_states(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
 {
-    static const Spec specs[] = {SERIES, {"predicted_covariances", 0, 4}, {"path_states", 0, 3}, {"smoothed", 1, 4}};
+    static const Spec specs[] = {SERIES, {"predicted_covariances", 0, 4, 0}, {"path_states", 0, 3, 0}, {"smoothed", 1, 4, 0}};
     enum { COUNT = sizeof(specs) / sizeof(specs[0]) };
     Array x[COUNT];
     Series s;
@@ -321,12 +341,96 @@ static PyObject *smoothed_states(PyObject *module, PyObject *const *arguments, P
     Py_RETURN_NONE;
 }
 
+/* ---- Windows ------------------------------------------------------------------------------------------------------------ */
+
+static int windows_fit(const Array *x, Windows *s)
+{
+    *s = (Windows){x[0].view.shape[1], x[0].view.shape[0], x[1].view.shape[0], x[1].view.shape[1], x[2].view.shape[0],
+                   x[2].view.shape[1], x[2].view.shape[2], x[3].view.shape[0], x[0].data, x[2].data,
+                   x[1].integers, x[3].integers, x[4].integers, x[5].integers};
+    if (!agree(&x[2], "maps", s->n_maps, s->n_outputs, s->n_accounts, s->n_inputs) || !agree(&x[4], "reach", s->n_outputs, 0, 0, 0)
+        || !agree(&x[5], "wanted", s->n_sums, 0, 0, 0))
+        return 0;
+    int is_sound = s->n_sums > 0 && s->n_maps > 0 && s->n_inputs > 0 && s->n_accounts > 0;
+    Py_ssize_t size = 0;
+    for (Py_ssize_t j = 0; is_sound && j < s->n_sums; j++) {
+        is_sound = s->ends[j] > (j ? s->ends[j - 1] : 0) && s->ends[j] <= s->n_outputs && s->wanted[j] >= 0
+                   && s->wanted[j] <= (j ? s->wanted[j - 1] : s->n_places);
+        size += s->wanted[j] * s->n_accounts * s->n;
+    }
+    for (Py_ssize_t i = 0; is_sound && i < s->n_outputs; i++) is_sound = s->reach[i] >= 0 && s->reach[i] <= s->n_inputs;
+    for (Py_ssize_t i = 0; is_sound && i < s->n_places * s->n_inputs; i++) is_sound = s->rows[i] >= 0 && s->rows[i] < s->n_values;
+    if (!is_sound || x[6].view.shape[0] != size) {
+        PyErr_SetString(PyExc_ValueError, "rows, ends, reach, wanted and found do not belong together");
+        return 0;
+    }
+    return 1;
+}
+
+static PyObject *whitened_squares(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
+{
+    static const Spec specs[] = {
+        {"values", 0, 2, 0}, {"rows", 0, 2, 1}, {"maps", 0, 4, 0}, {"ends", 0, 1, 1}, {"reach", 0, 1, 1}, {"wanted", 0, 1, 1},
+        {"found", 1, 1, 0},
+    };
+    enum { COUNT = sizeof(specs) / sizeof(specs[0]) };
+    Array x[COUNT];
+    Windows s;
+    if (take(arguments, given, specs, COUNT, x) < 0) return NULL;
+    int done = windows_fit(x, &s);
+    if (done) {
+        double *work = malloc((s.n_inputs + s.n_accounts) * WIDTH * sizeof(double));
+        done = work != NULL;
+        if (done) {
+            Py_BEGIN_ALLOW_THREADS
+            CHOOSE(look_at_windows)(&s, work, work + s.n_inputs * WIDTH, x[6].data);
+            Py_END_ALLOW_THREADS
+        } else
+            PyErr_NoMemory();
+        free(work);
+    }
+    release(x, COUNT);
+    if (!done) return NULL;
+    Py_RETURN_NONE;
+}
+
+static PyObject *log_mixtures(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
+{
+    static const Spec specs[] = {{"squares", 0, 3, 0}, {"scales", 0, 2, 0}, {"mixed", 1, 2, 0}};
+    enum { COUNT = sizeof(specs) / sizeof(specs[0]) };
+    Array x[COUNT];
+    if (given != COUNT + 2) {
+        PyErr_Format(PyExc_TypeError, "expected %d arrays and two numbers, got %zd arguments", COUNT, given);
+        return NULL;
+    }
+    const Py_ssize_t n_halves = PyLong_AsSsize_t(arguments[COUNT]);
+    const double freedom = PyFloat_AsDouble(arguments[COUNT + 1]);
+    if (PyErr_Occurred() || take(arguments, COUNT, specs, COUNT, x) < 0) return NULL;
+    const Py_ssize_t g = x[0].view.shape[0], a = x[0].view.shape[1], n = x[0].view.shape[2];
+    int done = agree(&x[1], "scales", g, a, 0, 0) && agree(&x[2], "mixed", g, n, 0, 0);
+    if (done) {
+        double *padded = malloc((a ? a : 1) * WIDTH * sizeof(double));
+        done = padded != NULL;
+        if (done) {
+            Py_BEGIN_ALLOW_THREADS
+            CHOOSE(mix_all)(x[0].data, g, a, n, x[1].data, n_halves, 1 / freedom, padded, x[2].data);
+            Py_END_ALLOW_THREADS
+        } else
+            PyErr_NoMemory();
+        free(padded);
+    }
+    release(x, COUNT);
+    if (!done) return NULL;
+    Py_RETURN_NONE;
+}
+
 /* ---- The module --------------------------------------------------------------------------------------------------------- */
 
 #define FUNCTION(name) {#name, (PyCFunction)(void (*)(void))name, METH_FASTCALL, NULL}
 
 static PyMethodDef functions[] = {
     FUNCTION(filter_systems), FUNCTION(filter_step), FUNCTION(squared_innovations), FUNCTION(smoothed_states),
+    FUNCTION(whitened_squares), FUNCTION(log_mixtures),
     {NULL, NULL, 0, NULL},
 };
 
@@ -708,6 +812,119 @@ static void smooth_all(int n, const Series *s, const double *predicted, const do
         for (int w = 0; w < WIDTH && first + w < s->n_series; w++) {
             double *own = smoothed + (first + w) * size;
             for (Py_ssize_t i = 0; i < size; i++) own[i] = together[i * WIDTH + w];
+        }
+    }
+}
+
+/* ---- Windows ------------------------------------------------------------------------------------------------------------ */
+
+#define OUTPUTS 4 /* rows of a map that are multiplied with a window at once */
+
+/* Adds the squares of outputs `begin` to `end` of a map, which are A for each of its rows, to the sums of the A accounts. */
+INLINE void square_outputs(const Windows *s, const double *map, Py_ssize_t begin, Py_ssize_t end, const double *window,
+                           double *sums)
+{
+    const Py_ssize_t k = s->n_inputs;
+    Py_ssize_t i = begin;
+    while (i < end) {
+        const int at_once = end - i >= OUTPUTS ? OUTPUTS : 1;
+        const Py_ssize_t used = s->reach[(i + at_once - 1) / s->n_accounts];
+        const double *row = map + i * k;
+        const Lane zero = times(0.0, load(window));
+        if (at_once == OUTPUTS) {
+            Lane a = zero, b = zero, c = zero, d = zero;
+            for (Py_ssize_t j = 0; j < used; j++) {
+                const Lane x = load(window + j * WIDTH);
+                a = plus(a, row[j], x);
+                b = plus(b, row[k + j], x);
+                c = plus(c, row[2 * k + j], x);
+                d = plus(d, row[3 * k + j], x);
+            }
+            double *of[OUTPUTS];
+            for (int o = 0; o < OUTPUTS; o++) of[o] = sums + (i + o) % s->n_accounts * WIDTH;
+            store(of[0], plus_product(load(of[0]), a, a));
+            store(of[1], plus_product(load(of[1]), b, b));
+            store(of[2], plus_product(load(of[2]), c, c));
+            store(of[3], plus_product(load(of[3]), d, d));
+        } else {
+            Lane a = zero;
+            for (Py_ssize_t j = 0; j < used; j++) a = plus(a, row[j], load(window + j * WIDTH));
+            double *of = sums + i % s->n_accounts * WIDTH;
+            store(of, plus_product(load(of), a, a));
+        }
+        i += at_once;
+    }
+}
+
+/* Sums of squares up to each end, one array (wanted, A, n) after the other. The maps of a place stay in the cache meanwhile. */
+static void look_at_windows(const Windows *s, double *window, double *sums, double *found)
+{
+    const Py_ssize_t a = s->n_accounts, n = s->n;
+    for (Py_ssize_t place = 0; place < s->wanted[0]; place++) {
+        const double *map = s->maps + (place < s->n_maps ? place : s->n_maps - 1) * s->n_outputs * a * s->n_inputs;
+        const int64_t *rows = s->rows + place * s->n_inputs;
+        for (Py_ssize_t first = 0; first < n; first += WIDTH) {
+            const Py_ssize_t width = n - first < WIDTH ? n - first : WIDTH;
+            for (Py_ssize_t k = 0; k < s->n_inputs; k++) {
+                const double *from = s->values + rows[k] * n + first;
+                if (width == WIDTH)
+                    store(window + k * WIDTH, load(from));
+                else
+                    for (int w = 0; w < WIDTH; w++) window[k * WIDTH + w] = w < width ? from[w] : 0;
+            }
+            memset(sums, 0, a * WIDTH * sizeof(double));
+            double *to = found;
+            Py_ssize_t begin = 0;
+            for (Py_ssize_t j = 0; j < s->n_sums && place < s->wanted[j]; j++) {
+                square_outputs(s, map, begin * a, s->ends[j] * a, window, sums);
+                begin = s->ends[j];
+                for (Py_ssize_t i = 0; i < a; i++)
+                    memcpy(to + (place * a + i) * n + first, sums + i * WIDTH, width * sizeof(double));
+                to += s->wanted[j] * a * n;
+            }
+        }
+    }
+}
+
+/* ln sum_a (scale_a (1 + square_a / freedom))^-(n_halves / 2) of WIDTH executions, squares n apart; powers by squaring. */
+INLINE void mix_lane(const double *squares, Py_ssize_t n, const double *scales, Py_ssize_t n_accounts, Py_ssize_t n_halves,
+                     double inverse, double *mixed)
+{
+    double least[WIDTH], total[WIDTH] = {0}, base[WIDTH], power[WIDTH];
+    for (int w = 0; w < WIDTH; w++) least[w] = INFINITY;
+    for (Py_ssize_t a = 0; a < n_accounts; a++)
+        for (int w = 0; w < WIDTH; w++) {
+            const double b = scales[a] + scales[a] * inverse * squares[a * n + w];
+            least[w] = b < least[w] ? b : least[w];
+        }
+    for (Py_ssize_t a = 0; a < n_accounts; a++) {
+        for (int w = 0; w < WIDTH; w++) base[w] = least[w] / (scales[a] + scales[a] * inverse * squares[a * n + w]);
+        for (int w = 0; w < WIDTH; w++) power[w] = n_halves % 2 ? sqrt(base[w]) : 1;
+        for (Py_ssize_t e = n_halves / 2; e; e /= 2) {
+            if (e % 2)
+                for (int w = 0; w < WIDTH; w++) power[w] *= base[w];
+            for (int w = 0; w < WIDTH; w++) base[w] *= base[w];
+        }
+        for (int w = 0; w < WIDTH; w++) total[w] += power[w];
+    }
+    for (int w = 0; w < WIDTH; w++) mixed[w] = log(total[w]) - n_halves / 2.0 * log(least[w]);
+}
+
+static void mix_all(const double *squares, Py_ssize_t n_places, Py_ssize_t n_accounts, Py_ssize_t n, const double *scales,
+                    Py_ssize_t n_halves, double inverse, double *padded, double *mixed)
+{
+    double some[WIDTH];
+    for (Py_ssize_t g = 0; g < n_places; g++) {
+        const double *own = squares + g * n_accounts * n, *scale = scales + g * n_accounts;
+        for (Py_ssize_t first = 0; first < n; first += WIDTH) {
+            if (n - first >= WIDTH) {
+                mix_lane(own + first, n, scale, n_accounts, n_halves, inverse, mixed + g * n + first);
+                continue;
+            }
+            for (Py_ssize_t a = 0; a < n_accounts; a++)
+                for (int w = 0; w < WIDTH; w++) padded[a * WIDTH + w] = w < n - first ? own[a * n + first + w] : 0;
+            mix_lane(padded, WIDTH, scale, n_accounts, n_halves, inverse, some);
+            memcpy(mixed + g * n + first, some, (n - first) * sizeof(double));
         }
     }
 }

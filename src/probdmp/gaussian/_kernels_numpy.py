@@ -7,13 +7,23 @@ All arrays are float64 and C-contiguous; the last arguments are written to. NaN 
 
 import numpy as np
 
-from probdmp.checks import LARGEST_MAGNITUDE, FloatArray
+from probdmp.checks import LARGEST_MAGNITUDE, FloatArray, IntArray
 
-__all__ = ["filter_step", "filter_systems", "smoothed_states", "squared_innovations"]
+__all__ = [
+    "filter_step",
+    "filter_systems",
+    "log_mixtures",
+    "smoothed_states",
+    "split_sums",
+    "squared_innovations",
+    "whitened_squares",
+]
 
 LOG_2PI = float(np.log(2 * np.pi))
 BLOCK = 2048
 """Series that are filtered side by side: what is known of them stays in the cache."""
+FEW = 16
+"""Executions up to which all places are multiplied at once: then the calls cost more than the numbers."""
 
 
 def filter_systems(
@@ -150,6 +160,99 @@ def smoothed_states(
             rho = sensor.T[..., None] * weighted + np.einsum("dkn,kdj->ndj", closed_loop[t], rho)
             corrected = predicted[t] + np.einsum("dnk,kdj->ndj", predicted_covariances[t], rho)
             smoothed[block, t] = path_states[t] + np.moveaxis(corrected, -1, 0).mT
+
+
+def whitened_squares(
+    values: FloatArray,
+    rows: IntArray,
+    maps: FloatArray,
+    ends: IntArray,
+    reach: IntArray,
+    wanted: IntArray,
+    found: FloatArray,
+) -> None:
+    """Squared length of windows after a linear map, summed up to several of its outputs.
+
+    Parameters
+    ----------
+    values : (M, n) array: all numbers that may be in a window, of each execution.
+    rows : (G, K) which of them make up the window at each of G places.
+    maps : (P, R, A, K) array: R outputs of each place under A accounts of it; a place beyond the last has its map.
+    ends : (J) increasing; sums run over outputs 0, 1, ..., end - 1.
+    reach : (R) an output, and those before it, depend on so many inputs, the first ones of a window.
+    wanted : (J) at how many places, the first ones, each of the sums is asked for; not increasing.
+    found : written: J arrays (wanted, A, n), one after the other.
+    """
+    n, (n_accounts, n_inputs) = values.shape[1], maps.shape[2:]
+    sums = split_sums(found, wanted, n_accounts, n)
+    if n <= FEW:
+        _look_at_all_places(values, rows, maps, ends, sums)
+        return
+    window = np.empty((n_inputs, n))
+    outputs = np.empty((int(np.diff(ends, prepend=0).max()) * n_accounts, n))
+    for place in range(int(wanted[0])):
+        np.take(values, rows[place], axis=0, out=window, mode="clip")
+        at_place, begin = maps[min(place, len(maps) - 1)].reshape(-1, n_inputs), 0
+        for j, (end, used) in enumerate(zip(ends, reach[ends - 1], strict=True)):
+            if place >= wanted[j]:
+                break
+            white = outputs[: (end - begin) * n_accounts]
+            np.matmul(at_place[begin * n_accounts : end * n_accounts, :used], window[:used], out=white)
+            np.multiply(white, white, out=white)
+            np.add.reduce(white.reshape(end - begin, n_accounts, n), axis=0, out=sums[j][place])
+            if j:
+                sums[j][place] += sums[j - 1][place]
+            begin = end
+
+
+def split_sums(found: FloatArray, wanted: IntArray, n_accounts: int, n: int) -> list[FloatArray]:
+    """The J arrays (wanted, A, n) that `whitened_squares` writes one after the other."""
+    parts = np.split(found, np.cumsum(wanted * n_accounts * n)[:-1])
+    return [part.reshape(count, n_accounts, n) for part, count in zip(parts, wanted, strict=True)]
+
+
+def log_mixtures(squares: FloatArray, scales: FloatArray, mixed: FloatArray, n_halves: int, freedom: float) -> None:
+    """ln sum_a (scale_a (1 + square_a / freedom))^-(n_halves / 2).
+
+    Parameters
+    ----------
+    squares, scales : (G, A, n) and (G, A) arrays.
+    mixed : written, (G, n).
+    """
+    # A few places at a time, which stay close to the processor.
+    step = max(1, 16384 // max(squares[0].size, 1)) if len(squares) else 1
+    for begin in range(0, len(squares), step):
+        part = slice(begin, begin + step)
+        bases = squares[part] * (scales[part, :, None] / freedom)
+        bases += scales[part, :, None]
+        least = bases.min(axis=1)
+        np.divide(least[:, None], bases, out=bases)
+        np.log(_power(bases, n_halves).sum(axis=1), out=mixed[part])
+        mixed[part] -= n_halves / 2 * np.log(least)
+
+
+def _power(base: FloatArray, n_halves: int) -> FloatArray:
+    """base^(n_halves / 2) of numbers from 0 to 1, by squaring: far faster than for any exponent."""
+    power, exponent = np.sqrt(base) if n_halves % 2 else None, n_halves // 2
+    while exponent:
+        if exponent % 2:
+            power = base.copy() if power is None else np.multiply(power, base, out=power)
+        exponent //= 2
+        if exponent:
+            np.multiply(base, base, out=base)
+    return np.ones_like(base) if power is None else power
+
+
+def _look_at_all_places(values: FloatArray, rows: IntArray, maps: FloatArray, ends: IntArray, found: list[FloatArray]) -> None:
+    count, (n_accounts, n_inputs) = len(found[0]), maps.shape[2:]
+    at = maps[:count] if count <= len(maps) else maps[np.minimum(np.arange(count), len(maps) - 1)]
+    at = at[:, : ends[-1]].reshape(count, -1, n_inputs)
+    white = np.matmul(at, values[rows[:count]])
+    np.multiply(white, white, out=white)
+    sums = np.add.reduceat(white.reshape(count, ends[-1], n_accounts, -1), [0, *ends[:-1]], axis=1)
+    np.cumsum(sums, axis=1, out=sums)
+    for j, own in enumerate(found):
+        own[:] = sums[: len(own), j]
 
 
 def _blocks(observations: FloatArray, paths: FloatArray) -> "list[tuple[slice, FloatArray]]":

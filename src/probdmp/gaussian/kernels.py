@@ -18,8 +18,11 @@ __all__ = [
     "filter_step",
     "filter_systems",
     "in_threads",
+    "log_mixtures",
     "smoothed_states",
+    "split_sums",
     "squared_innovations",
+    "whitened_squares",
 ]
 
 
@@ -49,6 +52,9 @@ filter_systems: Callable[..., None] = _kernels.filter_systems
 filter_step: Callable[..., int] = _kernels.filter_step
 squared_innovations: Callable[..., None] = _kernels.squared_innovations
 smoothed_states: Callable[..., None] = _kernels.smoothed_states
+whitened_squares: Callable[..., None] = _kernels.whitened_squares
+log_mixtures: Callable[..., None] = _kernels.log_mixtures
+split_sums = _kernels_numpy.split_sums
 
 
 def in_threads(work: Callable[[slice], None], n_series: int, n_threads: int) -> None:
