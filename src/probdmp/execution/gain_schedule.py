@@ -61,10 +61,8 @@ class GainSchedule:
     """S^-1 of what is seen, (T, O, O) array; 1 in the diagonal for what is not."""
     share_constants: FloatArray
     """(T, O) array, nats: the part of each output's share in the log-likelihood that readings have no part in."""
-    filtered: FloatArray
-    """(T, S, 3, 3) array: covariances of the states after each update."""
-    predicted: FloatArray
-    """(T, S, 3, 3) array: of the states one tick later."""
+    predicted: FloatArray | None
+    """(T, S, 3, 3) array: covariances of the states one tick later; None where nobody asks for them."""
     snapshots: tuple[Snapshot, ...]
     """Before the ticks 0, SNAPSHOT_EVERY, …, and after the last."""
 
@@ -72,7 +70,7 @@ class GainSchedule:
     def n_bytes(self) -> int:
         """About how much memory it takes."""
         kept = sum(s.covariance.nbytes + s.deviation.loading.nbytes for s in self.snapshots)
-        return kept + self.gains.nbytes + self.rows.nbytes + self.filtered.nbytes + self.predicted.nbytes
+        return kept + self.gains.nbytes + self.rows.nbytes + self.innovation_covariances.nbytes
 
 
 def single_execution(executions: JointExecutions) -> tuple[JointModel, FloatArray]:
@@ -82,7 +80,9 @@ def single_execution(executions: JointExecutions) -> tuple[JointModel, FloatArra
     return JointModel(model.means[0], model.factors[0], belief), rows[:, 0]
 
 
-def gain_schedule(primitive: Primitive, task: Task, dt: float, array: SensorArray, seen: BoolArray) -> GainSchedule:
+def gain_schedule(
+    primitive: Primitive, task: Task, dt: float, array: SensorArray, seen: BoolArray, with_states: bool = False
+) -> GainSchedule:
     """The gains of executions like one; those computed last are kept.
 
     Parameters
@@ -90,15 +90,16 @@ def gain_schedule(primitive: Primitive, task: Task, dt: float, array: SensorArra
     task : a batch of one: only its duration and what is told of it count.
     array : sensors whose readings say the same whatever is believed: linear ones, without gates.
     seen : (T, O) array, what is measured when.
+    with_states : whether to compute how certain the states are, which takes the longest.
     """
     told = [np.isnan(part).tobytes() for part in (task.start, task.goal, task.start_velocity) if part is not None]
     sensors = (array.dense_matrix.tobytes(), array.covariance.tobytes(), array.silent.tobytes())
-    key = (primitive.identity, float(task.duration[0]), dt, *told, *sensors, seen.shape, seen.tobytes())
+    key = (primitive.identity, float(task.duration[0]), dt, *told, *sensors, seen.shape, seen.tobytes(), with_states)
     with _LOCK:
         if key in _KEPT:
             _KEPT.move_to_end(key)
             return _KEPT[key]
-    schedule = _computed(primitive, task, dt, array, seen)
+    schedule = _computed(primitive, task, dt, array, seen, with_states)
     with _LOCK:
         _KEPT[key] = schedule
         while len(_KEPT) > 1 and sum(kept.n_bytes for kept in _KEPT.values()) > MOST_KEPT_BYTES:
@@ -110,7 +111,9 @@ _KEPT: OrderedDict[tuple[object, ...], GainSchedule] = OrderedDict()
 _LOCK = Lock()
 
 
-def _computed(primitive: Primitive, task: Task, dt: float, array: SensorArray, seen: BoolArray) -> GainSchedule:
+def _computed(
+    primitive: Primitive, task: Task, dt: float, array: SensorArray, seen: BoolArray, with_states: bool
+) -> GainSchedule:
     n_ticks, n_outputs = seen.shape
     executions = joint_executions(primitive, task, np.array([dt]), n_ticks + 1)
     model, rows = single_execution(executions)
@@ -121,7 +124,7 @@ def _computed(primitive: Primitive, task: Task, dt: float, array: SensorArray, s
     gains = np.zeros((n_ticks, factors.shape[0] * factors.shape[1] + n_states + r, n_outputs))
     spreads = np.empty((n_ticks, n_outputs, n_outputs))
     fused = np.empty((n_ticks, n_outputs), dtype=np.bool_)
-    filtered, predicted = np.empty((2, n_ticks, len(factors), 3, 3))
+    predicted = np.empty((n_ticks, len(factors), 3, 3)) if with_states else None
     snapshots = []
     for t, readings in enumerate(np.where(seen, 0.0, np.nan)):
         if t % SNAPSHOT_EVERY == 0:
@@ -131,16 +134,16 @@ def _computed(primitive: Primitive, task: Task, dt: float, array: SensorArray, s
         fused[t] = array.flat(update.seen.fused)
         spreads[t] = array.flat_covariances(update.seen.innovation_covariance)
         model = model._replace(belief=update.seen.belief)
-        filtered[t] = state_moments(model, update.deviation, rows[t])[1]
         deviation = predict_deviation(update.deviation, transition, noise)
-        predicted[t] = state_moments(model, deviation, rows[t + 1])[1]
+        if predicted is not None:
+            predicted[t] = state_moments(model, deviation, rows[t + 1])[1]
     snapshots.append(Snapshot(model.belief.covariance, deviation))
     both = fused[:, :, None] & fused[:, None, :]
     known, nothing = np.where(both, spreads, np.eye(n_outputs)), np.zeros((n_ticks, n_outputs))
     constants = log_density_shares(nothing, nothing, known, np.linalg.cholesky(known), fused)
     densities = (spreads, np.linalg.inv(known), constants)
     own = executions.system.transition[0, 0]
-    return GainSchedule(rows, own, gains, array.dense_matrix, fused, *densities, filtered, predicted, tuple(snapshots))
+    return GainSchedule(rows, own, gains, array.dense_matrix, fused, *densities, predicted, tuple(snapshots))
 
 
 def _gains(update: AugmentedUpdate, array: SensorArray, factors: FloatArray) -> FloatArray:

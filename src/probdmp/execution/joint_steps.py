@@ -113,6 +113,7 @@ class ScheduledTick(NamedTuple):
     @property
     def covariance(self) -> FloatArray:
         """(S, 3, 3) array."""
+        assert self.schedule.predicted is not None, "it was asked for"
         return np.asarray(self.schedule.predicted[self.tick])
 
     @property
@@ -146,7 +147,7 @@ class ScheduledFilter:
     def __init__(self, primitive: Primitive, task: Task, dt: float, chunk: int, array: SensorArray, exact: JointFilter) -> None:
         self._exact, self._is_exact, self._silent = exact, False, array.silent
         tasks, seen = stack_tasks([task]), np.ones((chunk, len(array.outputs)), dtype=np.bool_)
-        self._schedule = schedule = gain_schedule(primitive, tasks, dt, array, seen)
+        self._schedule = schedule = gain_schedule(primitive, tasks, dt, array, seen, with_states=True)
         plan = planned_states(joint_executions(primitive, tasks, np.array([dt]), chunk + 1))[:, 0]
         self._plan, self._expected = plan, plan.reshape(len(plan), -1) @ schedule.sensors.T
         self._n_parameters = plan.shape[1] * schedule.rows.shape[-1]

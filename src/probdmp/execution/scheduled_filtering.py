@@ -1,7 +1,6 @@
 """Executions filtered with the gains of a schedule: many side by side, or one tick by tick."""
 
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
@@ -9,21 +8,12 @@ from probdmp.checks import FloatArray
 from probdmp.dmp.joint_model import JointExecutions
 from probdmp.execution.gain_schedule import GainSchedule
 
-__all__ = ["Scheduled", "filter_scheduled", "innovation_map", "planned_outputs", "planned_states", "scheduled_log_likelihoods"]
+__all__ = ["innovation_map", "planned_outputs", "planned_states", "scheduled_innovations", "scheduled_log_likelihoods"]
 
 LARGEST_MAP = 2048
 """Numbers of an execution up to which its log-likelihood is one product with a matrix."""
 BLOCK = 1024
 """Executions that are filtered side by side."""
-
-
-class Scheduled(NamedTuple):
-    """What the filter finds in N executions."""
-
-    innovations: FloatArray
-    """(T, N, O) array; NaN where nothing was seen."""
-    states: FloatArray
-    """(T, N, S, 3) array: mean of the states after each update, less those planned."""
 
 
 def planned_states(executions: JointExecutions) -> FloatArray:
@@ -44,23 +34,20 @@ def planned_outputs(executions: JointExecutions, sensors: FloatArray) -> FloatAr
     return np.asarray(means.reshape(len(means), -1) @ outputs.T).reshape(-1, len(rows), len(sensors))
 
 
-def filter_scheduled(schedule: GainSchedule, readings: FloatArray) -> Scheduled:
-    """Filter readings (T, N, O) less those planned; what the schedule takes for seen must be there."""
-    (n_ticks, count, n_outputs), n_states = readings.shape, schedule.sensors.shape[1]
+def scheduled_innovations(schedule: GainSchedule, readings: FloatArray) -> FloatArray:
+    """Of readings (T, N, O) less those planned, (T, N, O); what the schedule takes for seen must be there."""
+    (n_ticks, count, _), n_states = readings.shape, schedule.sensors.shape[1]
     n_signals, n_parameters = n_states // 3, n_states // 3 * schedule.rows.shape[-1]
     kept = n_parameters + n_states
-    moved, states = np.zeros((count, kept)), np.empty((n_ticks, count, n_signals, 3))
-    innovations = np.empty((n_ticks, count, n_outputs))
-    of_parameters, of_deviations = moved[:, :n_parameters].reshape(count, n_signals, -1), moved[:, n_parameters:]
-    of_deviations = of_deviations.reshape(count, n_signals, 3)
+    moved, innovations = np.zeros((count, kept)), np.empty(readings.shape)
+    of_parameters = moved[:, :n_parameters].reshape(count, n_signals, -1)
+    of_deviations = moved[:, n_parameters:].reshape(count, n_signals, 3)
     for t in range(n_ticks):
-        rows = schedule.rows[t].T
-        now = of_parameters @ rows + of_deviations
+        now = of_parameters @ schedule.rows[t].T + of_deviations
         innovations[t] = readings[t] - now.reshape(count, -1) @ schedule.sensors.T
         moved += np.where(schedule.fused[t], innovations[t], 0.0) @ schedule.gains[t, :kept].T
-        states[t] = of_parameters @ rows + of_deviations
         of_deviations[:] = of_deviations @ schedule.transition.T
-    return Scheduled(innovations, states)
+    return innovations
 
 
 def scheduled_log_likelihoods(schedule: GainSchedule, readings: FloatArray) -> FloatArray:
@@ -74,7 +61,7 @@ def scheduled_log_likelihoods(schedule: GainSchedule, readings: FloatArray) -> F
             white = np.where(schedule.fused, block, 0.0).reshape(-1, n_numbers) @ innovation_map(schedule).T
             squares[first : first + BLOCK] = np.einsum("nk,nk->n", white, white)
         else:
-            innovations = filter_scheduled(schedule, block.swapaxes(0, 1)).innovations
+            innovations = scheduled_innovations(schedule, block.swapaxes(0, 1))
             e = np.where(schedule.fused[:, None], innovations, 0.0)
             squares[first : first + BLOCK] = np.einsum("tno,top,tnp->n", e, schedule.precisions, e, optimize=True)
     return constant - 0.5 * squares
@@ -89,7 +76,7 @@ def innovation_map(schedule: GainSchedule) -> FloatArray:
     n_ticks, n_outputs = schedule.fused.shape
     size = n_ticks * n_outputs
     impulses = np.eye(size).reshape(size, n_ticks, n_outputs).swapaxes(0, 1)
-    found = filter_scheduled(schedule, impulses).innovations  # (T, T O, O): of a unit reading at one time
+    found = scheduled_innovations(schedule, impulses)  # (T, T O, O): of a unit reading at one time
     whitening = np.linalg.cholesky(schedule.precisions).mT
     white = whitening @ np.where(schedule.fused[:, None], found, 0.0).swapaxes(1, 2)
     return np.ascontiguousarray(white.reshape(size, size))
