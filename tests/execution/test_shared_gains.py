@@ -16,13 +16,12 @@ from probdmp.execution import (
     joint_steps,
     recording_of_readings,
     sample_recordings,
-    scheduled_filtering,
     score_batch,
 )
 from probdmp.execution.gain_schedule import gain_schedule
 from probdmp.execution.joint_steps import JointFilter, ScheduledFilter, joint_filter
+from probdmp.execution.plans import planned_states
 from probdmp.execution.readings import readings_of
-from probdmp.execution.scheduled_filtering import planned_states, scheduled_innovations
 
 DT = 0.02
 
@@ -85,7 +84,7 @@ def test_one_product_or_one_recursion_is_the_same(seed):
     batch = random_batch(rng, primitive, array, 16, 0.0)
     by_product = score_batch(primitive, batch, array)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(scheduled_filtering, "LARGEST_MAP", 0)
+        patch.setattr("probdmp.execution.gain_schedule.LARGEST_MAP", 0)
         np.testing.assert_allclose(score_batch(primitive, batch, array), by_product, rtol=1e-9, atol=1e-9)
 
 
@@ -101,7 +100,7 @@ def test_innovations_of_a_schedule_are_those_of_the_filter(seed, coupling, chann
     readings[rng.random(readings.shape) < missing] = np.nan
     schedule = gain_schedule(primitive, task, DT, array, ~np.isnan(readings))
     plan = planned_states(joint_executions(primitive, task, np.array([DT]), len(readings)))
-    found = scheduled_innovations(schedule, readings[:, None] - plan.reshape(len(plan), 1, -1) @ schedule.sensors.T)
+    found = schedule.innovations(readings[:, None] - plan.reshape(len(plan), 1, -1) @ schedule.sensors.T)
     names = {name: readings[:, part] for name, part in array.slices.items()}
     expected = filter_recordings(primitive, unstack_tasks(task), [recording_of_readings(array, names, DT)], array)
     fused = expected.fused[:, 0]

@@ -11,6 +11,7 @@ them d', and of the latent z',
 
 from collections import OrderedDict
 from dataclasses import dataclass
+from functools import cached_property
 from threading import Lock
 
 import numpy as np
@@ -27,8 +28,12 @@ __all__ = ["GainSchedule", "Snapshot", "gain_schedule", "single_execution"]
 
 SNAPSHOT_EVERY = 16
 """Ticks between those of which all is kept, so that an execution can go on without the schedule."""
-MOST_KEPT_BYTES = 2**29
+MOST_KEPT_BYTES = 2**28
 """Of all schedules together that are kept for later executions."""
+LARGEST_MAP = 1024
+"""Numbers of an execution up to which its log-likelihood is one product with a matrix."""
+BLOCK = 1024
+"""Executions that are filtered side by side."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,7 +46,7 @@ class Snapshot:
     """Its offset is of no use."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class GainSchedule:
     """Gains for T ticks; P parameters and 3 S states of all signals, O outputs."""
 
@@ -70,7 +75,51 @@ class GainSchedule:
     def n_bytes(self) -> int:
         """About how much memory it takes."""
         kept = sum(s.covariance.nbytes + s.deviation.loading.nbytes for s in self.snapshots)
-        return kept + self.gains.nbytes + self.rows.nbytes + self.innovation_covariances.nbytes
+        mapped = self.innovation_map.nbytes if "innovation_map" in vars(self) else 0
+        return kept + mapped + self.gains.nbytes + self.rows.nbytes + self.innovation_covariances.nbytes
+
+    def innovations(self, readings: FloatArray) -> FloatArray:
+        """Of readings (T, N, O) less those planned, (T, N, O); what the schedule takes for seen must be there."""
+        (n_ticks, count, _), n_states = readings.shape, self.sensors.shape[1]
+        n_signals, n_parameters = n_states // 3, n_states // 3 * self.rows.shape[-1]
+        kept = n_parameters + n_states
+        moved, innovations = np.zeros((count, kept)), np.empty(readings.shape)
+        of_parameters = moved[:, :n_parameters].reshape(count, n_signals, -1)
+        of_deviations = moved[:, n_parameters:].reshape(count, n_signals, 3)
+        for t in range(n_ticks):
+            now = of_parameters @ self.rows[t].T + of_deviations
+            innovations[t] = readings[t] - now.reshape(count, -1) @ self.sensors.T
+            moved += np.where(self.fused[t], innovations[t], 0.0) @ self.gains[t, :kept].T
+            of_deviations[:] = of_deviations @ self.transition.T
+        return innovations
+
+    @cached_property
+    def innovation_map(self) -> FloatArray:
+        """M, (T O, T O), lower triangular: M readings are independent standard normal numbers; zero for what is not seen.
+
+        Readings are in their order in time, outputs of one tick together.
+        """
+        n_ticks, n_outputs = self.fused.shape
+        size = n_ticks * n_outputs
+        impulses = np.eye(size).reshape(size, n_ticks, n_outputs).swapaxes(0, 1)
+        found = self.innovations(impulses)  # (T, T O, O): of a unit reading at one time
+        whitening = np.linalg.cholesky(self.precisions).mT
+        white = whitening @ np.where(self.fused[:, None], found, 0.0).swapaxes(1, 2)
+        return np.ascontiguousarray(white.reshape(size, size))
+
+    def log_likelihoods(self, readings: FloatArray) -> FloatArray:
+        """Of complete readings (N, T, O) less those planned, (N,) array, nats."""
+        count, n_numbers = len(readings), self.fused.size
+        squares = np.empty(count)
+        for first in range(0, count, BLOCK):
+            block = readings[first : first + BLOCK]
+            if n_numbers <= LARGEST_MAP:
+                white = np.where(self.fused, block, 0.0).reshape(-1, n_numbers) @ self.innovation_map.T
+                squares[first : first + BLOCK] = np.einsum("nk,nk->n", white, white)
+            else:
+                e = np.where(self.fused[:, None], self.innovations(block.swapaxes(0, 1)), 0.0)
+                squares[first : first + BLOCK] = np.einsum("tno,top,tnp->n", e, self.precisions, e, optimize=True)
+        return float(self.share_constants.sum()) - 0.5 * squares
 
 
 def single_execution(executions: JointExecutions) -> tuple[JointModel, FloatArray]:

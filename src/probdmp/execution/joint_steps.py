@@ -15,7 +15,7 @@ from probdmp.dmp.joint_model import joint_executions, state_rows
 from probdmp.dmp.responses import continue_responses
 from probdmp.execution.gain_schedule import SNAPSHOT_EVERY, GainSchedule, Snapshot, gain_schedule, single_execution
 from probdmp.execution.joint_filtering import start_deviation, state_moments, update_joint
-from probdmp.execution.scheduled_filtering import planned_states
+from probdmp.execution.plans import planned_states
 from probdmp.execution.sensed_ticks import SensedTick, Tick
 from probdmp.execution.sensor_array import SensorArray
 from probdmp.gaussian import Belief, StaticUpdate, predict_deviation

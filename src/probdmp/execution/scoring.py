@@ -16,9 +16,9 @@ from probdmp.errors import InputError
 from probdmp.execution.execution_batch import ExecutionBatch
 from probdmp.execution.gain_schedule import gain_schedule
 from probdmp.execution.independent_filtering import sensed_system
+from probdmp.execution.plans import planned_outputs
 from probdmp.execution.readings import stack_readings
 from probdmp.execution.recordings import BATCH_SIZE, check_recordings, check_tasks, filter_recordings
-from probdmp.execution.scheduled_filtering import planned_outputs, scheduled_log_likelihoods
 from probdmp.execution.sensor_array import SensorArray
 from probdmp.gaussian import score_series, shared_gains, shifted_paths
 
@@ -93,7 +93,7 @@ def _score_joint(primitive: Primitive, batch: ExecutionBatch, array: SensorArray
     schedule = gain_schedule(primitive, batch.take([0]).tasks, batch.dt, array, seen)
     executions = joint_executions(primitive, batch.tasks, np.array([batch.dt]), len(seen))
     expected = planned_outputs(executions, schedule.sensors)
-    return scheduled_log_likelihoods(schedule, batch.observations - expected)
+    return schedule.log_likelihoods(batch.observations - expected)
 
 
 def _score_independent(primitive: Primitive, batch: ExecutionBatch, array: SensorArray) -> FloatArray:

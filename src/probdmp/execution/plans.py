@@ -1,0 +1,26 @@
+"""What is expected of executions before anything is measured."""
+
+import numpy as np
+
+from probdmp.checks import FloatArray
+from probdmp.dmp.joint_model import JointExecutions
+
+__all__ = ["planned_outputs", "planned_states"]
+
+
+def planned_states(executions: JointExecutions) -> FloatArray:
+    """The states expected without observations, (T, N, S, 3) array; rows may have a batch axis of length 1."""
+    model, rows = executions.model, executions.rows
+    means = model.means + np.matmul(model.factors, model.belief.mean[:, None, :, None])[..., 0]
+    if rows.shape[1] == 1:
+        return np.asarray(np.einsum("tkn,bsn->tbsk", rows[:, 0], means, optimize=True))
+    return np.asarray(np.einsum("tbkn,bsn->tbsk", rows, means, optimize=True))
+
+
+def planned_outputs(executions: JointExecutions, sensors: FloatArray) -> FloatArray:
+    """What is expected of sensors C (O, 3 S) without observations, (N, T, O) array; rows have a batch axis of length 1."""
+    model, rows = executions.model, executions.rows[:, 0]
+    means = model.means + np.matmul(model.factors, model.belief.mean[:, None, :, None])[..., 0]
+    by_state = sensors.reshape(len(sensors), -1, 3)
+    outputs = np.einsum("osk,tkn->tosn", by_state, rows).reshape(len(rows) * len(sensors), -1)
+    return np.asarray(means.reshape(len(means), -1) @ outputs.T).reshape(-1, len(rows), len(sensors))
