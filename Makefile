@@ -9,16 +9,18 @@ BENCH := benchmarks/.venv
 SOURCES := $(shell find src -name '*.py')
 GALLERY := $(patsubst examples/%.py,build/gallery/%.png,$(wildcard examples/*.py))
 
-.PHONY: demo test test-slow coverage lint types docs gallery n-basis figures results variation detection bench-env bench-detection clean
+.PHONY: demo test test-slow coverage lint types docs gallery n-basis figures results variation detection bench-env bench bench-detection bench-realtime clean
 
 demo: $(VENV)/.demo
 	$(BIN)/probdmp demo
 
 test: $(VENV)/.test
-	$(BIN)/python -m pytest -n auto
+	$(BIN)/python -m pytest -n auto --dist worksteal
 
+# What takes minutes; then properties once more, on eight times as many examples.
 test-slow: $(VENV)/.test
-	$(BIN)/python -m pytest -n auto -m slow
+	$(BIN)/python -m pytest -n auto --dist worksteal -m slow
+	HYPOTHESIS_PROFILE=more $(BIN)/python -m pytest -n auto --dist worksteal -m 'hypothesis and not slow'
 
 # The same tests as make test, and which lines of the library they run; fewer than 95 % are an error.
 coverage: $(VENV)/.dev
@@ -65,6 +67,15 @@ detection: $(VENV)/.demo
 # Peers that the library is compared with live in an environment of their own.
 bench-env: $(BENCH)/.ready
 
+# docs/benchmarks.md and its picture: speed against peers, this machine and targets; ten minutes on a machine that is idle.
+FLEET ?= 1000000
+bench: $(BENCH)/.ready
+	$(BENCH)/bin/python benchmarks/speed_tables.py --fleet $(FLEET)
+
+# Control loops at 1 kHz, ten seconds each.
+bench-realtime: $(BENCH)/.ready
+	$(BENCH)/bin/python benchmarks/realtime.py
+
 # benchmarks/detection.md: failure detectors against one another, on the recordings that PROBDMP_RECORDINGS points at.
 bench-detection: $(BENCH)/.ready
 	$(BENCH)/bin/python benchmarks/detection_tables.py
@@ -77,12 +88,12 @@ $(VENV)/.demo: EXTRA := plot
 $(VENV)/.docs: EXTRA := docs
 $(VENV)/.test: EXTRA := test
 $(VENV)/.dev: EXTRA := dev
-$(VENV)/.%: pyproject.toml
+$(VENV)/.%: pyproject.toml src/probdmp/gaussian/_kernels.c
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[$(EXTRA)]'
 	touch $@
 
-$(BENCH)/.ready: pyproject.toml benchmarks/requirements.txt
+$(BENCH)/.ready: pyproject.toml benchmarks/requirements.txt src/probdmp/gaussian/_kernels.c
 	test -x $(BENCH)/bin/python || $(PYTHON) -m venv $(BENCH)
 	$(BENCH)/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[test]' -r benchmarks/requirements.txt
 	touch $@

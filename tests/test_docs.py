@@ -42,6 +42,7 @@ def test_the_readme_has_code() -> None:
     assert {language for language, _ in code_blocks(ROOT / "README.md")} >= {"python", ""}
 
 
+@pytest.mark.usefixtures("sketched_or_rendered")
 @pytest.mark.parametrize("path", DOCUMENTS, ids=name_of)
 def test_code_in_documents_runs(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Blocks of a page run one after the other, in one folder and one namespace."""
@@ -68,8 +69,8 @@ def test_every_document_is_in_the_site_and_every_picture_in_a_document() -> None
 
 
 def test_every_picture_is_made_by_a_command() -> None:
-    """By `make figures` or `make n-basis`; those of the gallery by `make gallery`."""
-    makers = "".join((ROOT / "docs" / name).read_text() for name in ("figures.py", "n_basis.py"))
+    """By `make figures`, `make n-basis` or `make bench`; those of the gallery by `make gallery`."""
+    makers = "".join((ROOT / name).read_text() for name in ("docs/figures.py", "docs/n_basis.py", "benchmarks/speed_tables.py"))
     assert all(f'"{path.stem}' in makers or f"{path.stem}.png" in makers for path in (ROOT / "docs/images").iterdir())
 
 
