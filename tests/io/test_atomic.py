@@ -103,7 +103,7 @@ def assert_survives_kills(n_kills, make_primitive, folder):
 
 
 def test_killed_while_saving(make_primitive, tmp_path):
-    assert_survives_kills(20, make_primitive, tmp_path)
+    assert_survives_kills(8, make_primitive, tmp_path)
 
 
 @pytest.mark.slow

@@ -20,8 +20,10 @@ __all__ = ["convert"]
 
 
 def convert(
-    files: Annotated[list[Path], typer.Argument(metavar="IN…", help="Files to read (.npz, .csv).", show_default=False)],
-    output: Annotated[Path, typer.Argument(metavar="OUT", help="File to write (.npz, .csv).", show_default=False)],
+    files: Annotated[
+        list[Path], typer.Argument(metavar="IN…", help="Files to read (.npz, .csv, .parquet).", show_default=False)
+    ],
+    output: Annotated[Path, typer.Argument(metavar="OUT", help="File to write (.npz, .csv, .parquet).", show_default=False)],
     label: Annotated[
         str | None, typer.Option(metavar="LABEL", help="Keep this movement only; recordings without a label are of it.")
     ] = None,

@@ -31,7 +31,7 @@ def monitor(
     executions: Annotated[
         list[str],
         typer.Argument(
-            metavar="EXECUTION…|-", help="Recorded executions (.npz, .csv), or - for JSON lines.", show_default=False
+            metavar="EXECUTION…|-", help="Recorded executions (.npz, .csv, .parquet), or - for JSON lines.", show_default=False
         ),
     ],
     label: Label = None,

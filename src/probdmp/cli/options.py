@@ -19,6 +19,7 @@ __all__ = [
     "Force",
     "Goal",
     "Index",
+    "Jobs",
     "Json",
     "Label",
     "ModelFile",
@@ -40,14 +41,17 @@ POINT = "X,Y,…"
 
 ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="Model file made by probdmp fit.", show_default=False)]
 ExecutionFile = Annotated[
-    Path, typer.Argument(metavar="EXECUTION", help="Recorded executions (.npz, .csv).", show_default=False)
+    Path, typer.Argument(metavar="EXECUTION", help="Recorded executions (.npz, .csv, .parquet).", show_default=False)
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document, missing numbers as null.")]
+Jobs = Annotated[int, typer.Option("--jobs", min=1, metavar="N", help="Processes; 1 is this one.")]
 Label = Annotated[
     str | None, typer.Option("--label", metavar="LABEL", help="Which primitive, and the recordings with its label.")
 ]
 Index = Annotated[int, typer.Option("--index", min=0, metavar="I", help="Which recording, from 0; with --label, of those.")]
-RecordingFiles = Annotated[list[Path], typer.Argument(metavar="FILE…", help="Recordings (.npz, .csv).", show_default=False)]
+RecordingFiles = Annotated[
+    list[Path], typer.Argument(metavar="FILE…", help="Recordings (.npz, .csv, .parquet).", show_default=False)
+]
 Columns = Annotated[
     str | None,
     typer.Option("--columns", metavar="NAMES", help="Columns that are positions, such as x,y. Default: x, y, z and q…."),
@@ -85,7 +89,7 @@ OutputArrays = Annotated[
 
 Force = Annotated[bool, typer.Option("--force", help="Replace the output file if it exists.")]
 OutputRecordings = Annotated[
-    Path, typer.Option("--output", "-o", metavar="FILE", help="Recordings to write (.npz, .csv).", show_default=False)
+    Path, typer.Option("--output", "-o", metavar="FILE", help="Recordings to write (.npz, .csv, .parquet).", show_default=False)
 ]
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -35,6 +36,7 @@ class Rate:
         return f"{self.count}/{self.n} ({100 * self.rate:.1f} %, {100 * self.low:.1f}–{100 * self.high:.1f} %)"
 
 
+@cache
 def rate_of(count: int, n: int) -> Rate:
     """The rate of `count` in `n` >= 1 independent cases with its exact binomial interval.
 

@@ -7,9 +7,16 @@ from probdmp.io.json_document import read_json
 from probdmp.io.model_contents import ModelContents
 from probdmp.io.model_file import decode_model, encode_model, read_model, write_model
 from probdmp.io.npz import read_npz, write_npz
+from probdmp.io.parquet import read_parquet, write_parquet
+from probdmp.io.parquet_executions import Executions, ParquetExecutions, Span
+from probdmp.io.parquet_table import ExecutionTable
 
 __all__ = [
+    "ExecutionTable",
+    "Executions",
     "ModelContents",
+    "ParquetExecutions",
+    "Span",
     "decode_model",
     "encode_model",
     "read_csv",
@@ -17,9 +24,11 @@ __all__ = [
     "read_json",
     "read_model",
     "read_npz",
+    "read_parquet",
     "write_atomically",
     "write_csv",
     "write_demonstrations",
     "write_model",
     "write_npz",
+    "write_parquet",
 ]

@@ -7,11 +7,14 @@ meanwhile may leave its temporary file, `.<random>.tmp`. POSIX.
 import os
 import secrets
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
 from probdmp.errors import InputError
 
-__all__ = ["write_atomically"]
+__all__ = ["replacing", "write_atomically"]
 
 
 def write_atomically(path: str | os.PathLike[str], payload: bytes) -> None:
@@ -24,6 +27,13 @@ def write_atomically(path: str | os.PathLike[str], payload: bytes) -> None:
     OSError
         If the disk refuses: no such directory, no rights, no space. Then nothing has changed.
     """
+    with replacing(path) as file:
+        file.write(payload)
+
+
+@contextmanager
+def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
+    """A file to write piece by piece, which takes the place of another when all has been written; errors as above."""
     target = Path(path)
     mode = _mode(target)
     temporary = target.with_name(f".{secrets.token_hex(8)}.tmp")
@@ -32,7 +42,7 @@ def write_atomically(path: str | os.PathLike[str], payload: bytes) -> None:
         with os.fdopen(descriptor, "wb") as file:
             if mode is not None:
                 os.fchmod(descriptor, mode)
-            file.write(payload)
+            yield file
             file.flush()
             os.fsync(descriptor)
         os.replace(temporary, target)

@@ -9,6 +9,7 @@ from probdmp.demonstrations import Demonstration
 from probdmp.errors import InputError
 from probdmp.io.csv import read_csv, write_csv
 from probdmp.io.npz import read_npz, write_npz
+from probdmp.io.parquet import read_parquet, write_parquet
 
 __all__ = ["FORMATS", "Format", "read_demonstrations", "write_demonstrations"]
 
@@ -23,6 +24,7 @@ class Format(NamedTuple):
 FORMATS = {
     ".npz": Format(read_npz, write_npz),
     ".csv": Format(read_csv, write_csv),
+    ".parquet": Format(read_parquet, write_parquet),
 }
 """By suffix."""
 

@@ -1,0 +1,68 @@
+"""Executions that can be judged side by side: of one primitive, equally long, at one rate."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from probdmp.checks import FloatArray, IntArray
+from probdmp.dmp import Primitive, Task
+from probdmp.io import ExecutionTable
+
+__all__ = ["alike", "observations_of", "tasks_of"]
+
+MOST_SAMPLES = 2**19
+"""Of the executions of a block together: what a few thousand short ones have."""
+
+
+def alike(table: ExecutionTable, owners: IntArray) -> Iterator[IntArray]:
+    """Places of executions that make a block, block by block.
+
+    Parameters
+    ----------
+    owners : (N,) array: which primitive each is of; -1 where it is not to be judged.
+    """
+    lengths = np.diff(table.offsets)
+    chosen = np.flatnonzero(owners >= 0)
+    if not len(chosen):
+        return
+    keys = (lengths[chosen], table.steps[chosen], owners[chosen])
+    order = chosen[np.lexsort(keys)]
+    differ = np.logical_or.reduce([key[order][1:] != key[order][:-1] for key in (lengths, table.steps, owners)])
+    for group in np.split(order, np.flatnonzero(differ) + 1):
+        size = max(MOST_SAMPLES // int(lengths[group[0]]), 1)
+        for first in range(0, len(group), size):
+            yield group[first : first + size]
+
+
+def observations_of(table: ExecutionTable, which: IntArray, names: Sequence[str]) -> FloatArray:
+    """Columns of executions that are equally long, (N, T, C) array; NaN where a column is not in the file."""
+    starts = table.offsets[which]
+    n_samples = int(table.offsets[which[0] + 1] - starts[0])
+    values = np.full((len(which), n_samples, len(names)), np.nan)
+    # Whole rows are copied at once where all executions, not only these, are equally long.
+    by_rows = bool((np.diff(table.offsets) == n_samples).all())
+    places = which if by_rows else starts[:, None] + np.arange(n_samples)
+    for i, name in enumerate(names):
+        if name in table.columns:
+            column = table.columns[name]
+            values[:, :, i] = (column.reshape(-1, n_samples) if by_rows else column)[places]
+    return values
+
+
+def tasks_of(table: ExecutionTable, which: IntArray, primitive: Primitive) -> Task:
+    """What executions were told, as one batch: without it, their first row, no goal, and the learned duration."""
+
+    def told(name: str) -> FloatArray:
+        return table.told[name][which] if name in table.told else np.full(len(which), np.nan)
+
+    def seen(name: str) -> FloatArray:
+        return table.columns[name][table.offsets[which]] if name in table.columns else np.full(len(which), np.nan)
+
+    starts = [np.where(np.isnan(told(f"start_{name}")), seen(name), told(f"start_{name}")) for name in primitive.names]
+    goals = [told(f"goal_{name}") for name in primitive.names]
+    durations = told("duration")
+    return Task(
+        np.stack(starts, axis=-1),
+        np.stack(goals, axis=-1),
+        np.where(np.isnan(durations), primitive.duration, durations),
+    )

@@ -1,0 +1,58 @@
+"""A file of executions, cut into parts that are scored by themselves."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from probdmp.checks import BoolArray, IntArray
+from probdmp.io import Executions, ParquetExecutions, Span
+
+__all__ = ["PART_SAMPLES", "Part", "parts_of", "repeated_ids"]
+
+PART_SAMPLES = 2**21
+"""Samples of a part, about: what a run that is killed loses at most, per process."""
+
+
+class Part(NamedTuple):
+    """Executions that are scored together, and whose scores are kept together."""
+
+    number: int
+    first: int
+    """Place of its first execution among those of the file."""
+    n_executions: int
+    span: Span
+    repeated: IntArray
+    """Places of executions in it whose name others in the file have too."""
+
+
+def parts_of(file: ParquetExecutions, executions: Executions, samples: int = PART_SAMPLES) -> list[Part]:
+    """The parts of a file: always the same for the same file and number of samples.
+
+    Parameters
+    ----------
+    samples : of a part, about. Where rows are executions, each is taken to have as many as on average.
+    """
+    starts, repeated = executions.starts, repeated_ids(executions)
+    per_row = file.samples_per_row if file.layout.is_dense else 1.0
+    rows = max(int(samples / max(per_row, 1.0)), 1)
+    # A part ends where the execution ends in which its last row is.
+    cuts = np.searchsorted(starts, np.arange(rows, max(int(starts[-1]), 1), rows), side="left")
+    edges = np.unique(np.concatenate([[0], cuts, [len(executions)]]))
+    parts = []
+    for index, (first, last) in enumerate(zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True)):
+        counts = None if file.layout.is_dense else np.diff(starts[first : last + 1])
+        span = Span(int(starts[first]), int(starts[last]), counts)
+        parts.append(Part(index, first, last - first, span, np.flatnonzero(repeated[first:last])))
+    return parts
+
+
+def repeated_ids(executions: Executions) -> BoolArray:
+    """(N,) array: whether another execution has the same name."""
+    import pyarrow.compute as pc
+
+    if pc.count_distinct(executions.ids, mode="all").as_py() == len(executions):
+        return np.zeros(len(executions), dtype=bool)
+    codes = executions.ids.dictionary_encode().combine_chunks().indices
+    known = np.asarray(pc.fill_null(codes, -1).to_numpy(zero_copy_only=False))
+    counts = np.bincount(known + 1)
+    return np.asarray((counts[known + 1] > 1) & (known >= 0))

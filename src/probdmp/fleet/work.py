@@ -1,0 +1,170 @@
+"""Scoring parts of a file, in this process or in others."""
+
+import io
+import itertools
+import multiprocessing
+import os
+import threading
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+
+from probdmp import __version__
+from probdmp.errors import DataFileError, ProbDMPError
+from probdmp.fleet.plan import Part
+from probdmp.fleet.scorer import Scorer
+from probdmp.io import ExecutionTable, ParquetExecutions
+
+__all__ = ["Assignment", "Worker", "process_pool", "score_here", "score_in_processes"]
+
+Item = TypeVar("Item")
+ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+"""What keeps the linear algebra of several processes from getting in each other's way."""
+WAITING = 2
+"""Parts that are handed to each process at a time: the one it works at, and the next."""
+
+
+class Assignment(NamedTuple):
+    """What a worker has to know once."""
+
+    model: bytes
+    """The model file."""
+    name: str
+    """Its name, for messages."""
+    path: str
+    """Of the executions."""
+    fingerprint: str
+    """Of the executions, so that no worker reads another file under the same name."""
+    version: str
+    """Of probdmp, so that all workers score in the same way."""
+
+
+class Worker:
+    """Scores parts, one after the other.
+
+    Raises
+    ------
+    DataFileError, ModelFileError
+        If the files cannot be used.
+    """
+
+    def __init__(self, assignment: Assignment) -> None:
+        if assignment.version != __version__:
+            hint = "Install the same on every worker."
+            raise ProbDMPError(f"probdmp {assignment.version} on all workers", f"{__version__} on one of them", hint)
+        self._scorer = Scorer(assignment.model, assignment.name)
+        self._file = ParquetExecutions(assignment.path)
+        if self._file.fingerprint != assignment.fingerprint:
+            hint = "Every worker must see the same file, and nobody may write to it meanwhile."
+            raise DataFileError(f"the same executions at {assignment.path!r} for all workers", "others", hint)
+        self._columns = self._scorer.columns(self._file.layout, self._file.path)
+
+    def scores(self, parts: Iterable[Part]) -> Iterator[tuple[int, bytes]]:
+        """Of each part its index and its scores, a Parquet file; the next executions are read meanwhile."""
+        pieces = _ahead((part, table) for part in parts for table in self._file.read(part.span, self._columns))
+        for _, group in itertools.groupby(pieces, key=lambda piece: piece[0].number):
+            of_part = list(self._scored(group))
+            yield of_part[0][0].number, _payload([table for _, table in of_part])
+
+    def _scored(self, pieces: Iterable[tuple[Part, ExecutionTable]]) -> Iterator[tuple[Part, Any]]:
+        done = 0
+        for part, table in pieces:
+            repeated = np.isin(np.arange(done, done + len(table)), part.repeated)
+            table.refuse(repeated, "Expected each execution_id once, its rows together, got it in several places of the file.")
+            done += len(table)
+            yield part, self._scorer.score(table)
+
+
+def score_here(assignment: Assignment, parts: Sequence[Part]) -> Iterator[tuple[int, bytes]]:
+    """In this process."""
+    yield from Worker(assignment).scores(parts)
+
+
+def score_in_processes(assignment: Assignment, parts: Sequence[Part], jobs: int) -> Iterator[tuple[int, bytes]]:
+    """In several processes on this machine, as they get done.
+
+    Raises
+    ------
+    ProbDMPError
+        If one of them is killed.
+    """
+    waiting: set[Future[tuple[int, bytes]]] = set()
+    with process_pool(jobs, assignment) as pool:
+        for part in parts:
+            waiting.add(pool.submit(_score, part))
+            if len(waiting) >= WAITING * jobs:
+                done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+                yield from (future.result() for future in done)
+        yield from (future.result() for future in waiting)
+
+
+@contextmanager
+def process_pool(jobs: int, assignment: Assignment | None = None) -> Iterator[ProcessPoolExecutor]:
+    """Processes that end with this one, whose linear algebra has one thread each.
+
+    Raises
+    ------
+    ProbDMPError
+        If one of them is killed.
+    """
+    context = multiprocessing.get_context("spawn")
+    before = {name: os.environ.get(name) for name in ONE_THREAD}
+    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))  # read by what a process imports, so they cannot be told later
+    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_begin, initargs=(assignment,))
+    try:
+        yield pool
+    except BrokenProcessPool as error:
+        hint = "Was there enough memory? Call it again, perhaps with fewer --jobs."
+        raise ProbDMPError("all processes to live until the end", "one that was killed", hint) from error
+    finally:
+        pool.shutdown(cancel_futures=True)
+        os.environ.update({name: value for name, value in before.items() if value is not None})
+        for name in (name for name, value in before.items() if value is None):
+            del os.environ[name]
+
+
+_worker: Worker | None = None
+"""Of a process that was started by `score_in_processes`."""
+
+
+def _begin(assignment: Assignment | None) -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    if assignment is not None:
+        global _worker
+        _worker = Worker(assignment)
+
+
+def _end_with(parent: Any) -> None:
+    """A process whose parent was killed would wait for work for ever."""
+    parent.join()
+    os._exit(1)
+
+
+def _score(part: Part) -> tuple[int, bytes]:
+    assert _worker is not None, "the process was initialized"
+    return next(_worker.scores([part]))
+
+
+def _ahead(items: Iterator[Item]) -> Iterator[Item]:
+    """The items, the next of which is made in another thread while one is in use."""
+    end = object()
+    with ThreadPoolExecutor(1) as reader:
+        upcoming: Future[Any] = reader.submit(next, items, end)
+        while (item := upcoming.result()) is not end:
+            upcoming = reader.submit(next, items, end)
+            yield item
+
+
+def _payload(tables: list[Any]) -> bytes:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    buffer = io.BytesIO()
+    pq.write_table(pa.concat_tables(tables).unify_dictionaries().combine_chunks(), buffer)
+    return buffer.getvalue()
