@@ -2,11 +2,17 @@
 
 import os
 import re
+import runpy
 import subprocess
 import sys
 from pathlib import Path
 
+import matplotlib
+import matplotlib.pyplot as plt
 import pytest
+from shortcuts import sample_less_often
+
+matplotlib.use("Agg")
 
 EXAMPLES = sorted((Path(__file__).parent.parent / "examples").glob("*.py"))
 MOST_LINES = 80
@@ -26,14 +32,34 @@ def test_an_example_is_short_and_says_what_it_shows(path: Path) -> None:
     assert re.fullmatch(r'"""[A-Z].*[.?]', lines[0])
 
 
+def check_what_came_of_it(printed: str, figure: Path) -> None:
+    assert printed.strip(), "an example also says what it found"
+    assert figure.read_bytes().startswith(b"\x89PNG")
+    assert [child.name for child in figure.parent.iterdir()] == ["figure.png"]
+
+
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
-def test_an_example_runs_and_draws_one_figure(path: Path, tmp_path: Path) -> None:
+def test_an_example_runs_and_draws_one_figure(
+    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In this process, which has loaded what it needs, on recordings sampled less often; warnings are errors here too."""
+    figure = tmp_path / "figure.png"
+    sample_less_often(monkeypatch)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", [str(path), str(figure)])
+    with matplotlib.rc_context():
+        runpy.run_path(str(path), run_name="__main__")
+    plt.close("all")
+    check_what_came_of_it(capsys.readouterr().out, figure)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_an_example_runs_as_a_program_of_its_own(path: Path, tmp_path: Path) -> None:
     figure = tmp_path / "figure.png"
     command = [sys.executable, "-W", "error", str(path), str(figure)]
     done = subprocess.run(
         command, cwd=tmp_path, env=os.environ | {"MPLBACKEND": "Agg"}, capture_output=True, text=True, timeout=LONGEST
     )
     assert done.returncode == 0, done.stderr
-    assert done.stdout.strip(), "an example also says what it found"
-    assert figure.read_bytes().startswith(b"\x89PNG")
-    assert [child.name for child in tmp_path.iterdir()] == ["figure.png"]
+    check_what_came_of_it(done.stdout, figure)

@@ -129,6 +129,7 @@ def test_several_seeds(folder, run_json, letters):
     assert [facts["seed"] for facts in document["calibrations"]] == [5, 6]
 
 
+@pytest.mark.usefixtures("sketched")
 def test_a_report_of_an_evaluation(folder, run, tmp_path):
     page = tmp_path / "r.html"
     arguments = ("evaluate", folder / "letters.npz", *SMALL, "--fault", "hold,push,dropout,spikes", "--report", page)
@@ -146,6 +147,7 @@ def test_a_report_of_an_evaluation(folder, run, tmp_path):
     assert (tmp_path / "again.html").read_text() == text
 
 
+@pytest.mark.usefixtures("sketched")
 def test_a_report_of_the_papers_rule_has_no_calibration(folder, run, tmp_path):
     result = run("evaluate", folder / "letters.npz", *SMALL, *PAPER, "--report", tmp_path / "r.html")
     assert result.exit_code == 0
@@ -205,6 +207,7 @@ def test_help_names_every_choice(run):
 DEMO = ("demo", "--letters", "l", "--train", 2, "--test", 2)
 
 
+@pytest.mark.usefixtures("sketched")
 def test_demo_writes_a_report(run, tmp_path):
     report = tmp_path / "r.html"
     result = run(*DEMO, "-o", report)

@@ -68,6 +68,7 @@ def titles_drawn(monkeypatch):
     return titles
 
 
+@pytest.mark.usefixtures("sketched")
 def test_demonstrations_of_one_label_are_drawn_over_time(place, run, tmp_path, monkeypatch):
     titles = titles_drawn(monkeypatch)
     for arguments in (("--label", "c"), ()):
@@ -75,6 +76,7 @@ def test_demonstrations_of_one_label_are_drawn_over_time(place, run, tmp_path, m
     assert titles == ["Path", "x over time", "y over time", "“c”, 6", "“l”, 6"]
 
 
+@pytest.mark.usefixtures("sketched")
 def test_a_verdict_stands_above_the_monitors_picture(place, run, tmp_path, monkeypatch):
     headings = []
     monkeypatch.setattr("matplotlib.figure.Figure.suptitle", lambda figure, text, **options: headings.append(text))
@@ -85,6 +87,7 @@ def test_a_verdict_stands_above_the_monitors_picture(place, run, tmp_path, monke
     assert headings[1].startswith("c, recording 1: f")
 
 
+@pytest.mark.usefixtures("sketched")
 def test_one_degree_of_freedom(run, tmp_path, letters):
     place = tmp_path
     write_demonstrations(place / "one.npz", [Demonstration(d.positions[:, :1], d.dt, "a", ("q1",)) for d in letters[:4]])
@@ -155,6 +158,7 @@ def test_a_report_of_a_model(place, run, tmp_path):
     assert f"probdmp report {place / 'letters.probdmp'} -o {page}" in text
 
 
+@pytest.mark.usefixtures("sketched")
 def test_a_model_says_how_it_was_learned(place, run, run_json, tmp_path):
     model, page = tmp_path / "m.probdmp", tmp_path / "r.html"
     run("fit", place / "letters.npz", "-o", model, "--n-basis", 7, "--label", "c", "--rule", "paper", "--json")
@@ -164,12 +168,14 @@ def test_a_model_says_how_it_was_learned(place, run, run_json, tmp_path):
     assert command in page.read_text()
 
 
+@pytest.mark.usefixtures("sketched")
 def test_only_one_primitive_is_drawn(place, run, tmp_path):
     page = tmp_path / "r.html"
     assert run("report", place / "letters.probdmp", "--label", "l", "-o", page).exit_code == 0
     assert page.read_text().count("<svg") == 5
 
 
+@pytest.mark.usefixtures("sketched")
 def test_a_report_of_an_evaluation_is_the_one_that_evaluate_writes_less_the_execution(place, run, tmp_path):
     kept, made = tmp_path / "kept.html", tmp_path / "made.html"
     assert run("report", place / "evaluation.json", "-o", kept).exit_code == 0

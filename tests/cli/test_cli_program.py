@@ -263,7 +263,7 @@ def test_progress_shows_in_a_terminal(folder):
     assert re.search(r"Calibrating .*[1-9]/4.* elapsed, .* left", shown)  # two primitives, with and without their goals
 
 
-@pytest.mark.parametrize("width", [80, 120])
+@pytest.mark.parametrize("width", [80, pytest.param(120, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     "words", ["inspect letters.probdmp", "rollout c.probdmp", "monitor c.probdmp unlabelled.npz", "inspect --system"]
 )

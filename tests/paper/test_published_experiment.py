@@ -177,7 +177,7 @@ def check_blocked_fail_more_often(reading, only_blocked, only_undisturbed):
 @pytest.mark.parametrize("configuration", CONFIGURATIONS)
 def test_the_protocol_on_a_few_letters(configuration):
     """Blocked executions are called failed far more often than undisturbed ones, step by step."""
-    demonstrations = synthetic_letters(20, letters="alv")
+    demonstrations = synthetic_letters(20, letters="alv", dt=0.02)
     check_laws(demonstrations, Experiment(configuration=CONFIGURATIONS[configuration]), 3)
 
 

@@ -37,6 +37,7 @@ def test_the_page_of_an_evaluation(evaluation):
     assert "holds figures, no recordings" in text
 
 
+@pytest.mark.usefixtures("sketched")
 def test_with_an_example_it_shows_an_execution(evaluation):
     text = evaluation_page(evaluation.record(), example_of(evaluation, synthetic_letters(7, seed=2, letters="cl", dt=0.02)))
     check_page(text)
@@ -44,6 +45,7 @@ def test_with_an_example_it_shows_an_execution(evaluation):
         assert words in text
 
 
+@pytest.mark.usefixtures("sketched")
 def test_an_evaluation_without_traces_has_no_curves(evaluation):
     outcomes = {
         name: replace(judged, outcomes=[

@@ -90,10 +90,10 @@ def test_the_first_35_of_several_lines_differ_in_more_than_colour():
     assert len(marked) == 12
 
 
-def test_the_same_picture_gives_the_same_bytes(tmp_path, every_panel):
+def test_the_same_picture_gives_the_same_bytes(tmp_path, letters):
     for suffix in (".svg", ".png", ".pdf"):
         for name in ("one", "two"):
-            save_panels(tmp_path / f"{name}{suffix}", every_panel[:2], 2, "heading")
+            save_panels(tmp_path / f"{name}{suffix}", demonstration_panels(letters)[:2], 2, "heading")
         assert (tmp_path / f"one{suffix}").read_bytes() == (tmp_path / f"two{suffix}").read_bytes()
 
 

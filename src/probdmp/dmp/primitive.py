@@ -2,6 +2,7 @@
 
 import hashlib
 from dataclasses import dataclass, fields, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -161,13 +162,7 @@ class Primitive:
     @property
     def identity(self) -> str:
         """SHA-256 of everything that determines what the primitive does; a detector knows its primitive by it."""
-        digest = hashlib.sha256()
-        for field in fields(self):
-            value = getattr(self, field.name)
-            parts = value.arrays().values() if isinstance(value, Variation | ChannelVariation) else (value,)
-            for part in (*parts, *(value.names if isinstance(value, ChannelVariation) else ())):
-                digest.update(part.tobytes() if isinstance(part, np.ndarray) else repr(part).encode())
-        return digest.hexdigest()
+        return _identity_of(self)
 
     def starts(self, task: Task) -> FloatArray:
         """p0, (*batch, D) array: where a task starts, as far as it is known; the mean start elsewhere."""
@@ -182,6 +177,18 @@ class Primitive:
         scaled = np.array(self.scaled)
         reference = np.where(scaled, self.goal_displacements, 1.0)
         return np.where(scaled, (self.goals(task) - self.starts(task)) / reference, 1.0)
+
+
+@lru_cache(maxsize=1024)
+def _identity_of(primitive: Primitive) -> str:
+    """Kept: detectors ask for it with every execution."""
+    digest = hashlib.sha256()
+    for field in fields(primitive):
+        value = getattr(primitive, field.name)
+        parts = value.arrays().values() if isinstance(value, Variation | ChannelVariation) else (value,)
+        for part in (*parts, *(value.names if isinstance(value, ChannelVariation) else ())):
+            digest.update(part.tobytes() if isinstance(part, np.ndarray) else repr(part).encode())
+    return digest.hexdigest()
 
 
 def task_for(

@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,7 @@ class Scorer:
     ----------
     payload : the bytes of the file.
     name : of the file, for messages.
+    threads : that score executions at the same time.
 
     Raises
     ------
@@ -36,7 +38,8 @@ class Scorer:
         If it is damaged, or has no detector.
     """
 
-    def __init__(self, payload: bytes, name: str) -> None:
+    def __init__(self, payload: bytes, name: str, threads: int = 1) -> None:
+        self._threads = threads
         contents = decode_model(payload, name)
         if contents.detector is None:
             hint = "Learn it with probdmp fit, which saves one, or give save() a fitted FailureDetector."
@@ -85,8 +88,9 @@ class Scorer:
         owners = self._owners(table)
         self._check(table, owners)
         scores = Scores(table)
-        for which in alike(table, np.where(table.usable, owners, -1)):
-            self._score(table, which, int(owners[which[0]]), scores)
+        blocks = list(alike(table, np.where(table.usable, owners, -1)))
+        with ThreadPoolExecutor(self._threads) as pool:  # each writes what is about its own executions
+            list(pool.map(lambda which: self._score(table, which, int(owners[which[0]]), scores), blocks))
         names = np.array([*table.labels, None], dtype=object)[table.codes]
         known = np.array([*self._labels, None], dtype=object)[owners]
         return scores.as_table(np.where(owners >= 0, known, names))

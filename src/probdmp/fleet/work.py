@@ -46,17 +46,21 @@ class Assignment(NamedTuple):
 class Worker:
     """Scores parts, one after the other.
 
+    Parameters
+    ----------
+    threads : that score the executions of a part at the same time.
+
     Raises
     ------
     DataFileError, ModelFileError
         If the files cannot be used.
     """
 
-    def __init__(self, assignment: Assignment) -> None:
+    def __init__(self, assignment: Assignment, threads: int = 1) -> None:
         if assignment.version != __version__:
             hint = "Install the same on every worker."
             raise ProbDMPError(f"probdmp {assignment.version} on all workers", f"{__version__} on one of them", hint)
-        self._scorer = Scorer(assignment.model, assignment.name)
+        self._scorer = Scorer(assignment.model, assignment.name, threads)
         self._file = ParquetExecutions(assignment.path)
         if self._file.fingerprint != assignment.fingerprint:
             hint = "Every worker must see the same file, and nobody may write to it meanwhile."
@@ -80,8 +84,8 @@ class Worker:
 
 
 def score_here(assignment: Assignment, parts: Sequence[Part]) -> Iterator[tuple[int, bytes]]:
-    """In this process."""
-    yield from Worker(assignment).scores(parts)
+    """In this process, on all processors that it may use."""
+    yield from Worker(assignment, processors()).scores(parts)
 
 
 def score_in_processes(assignment: Assignment, parts: Sequence[Part], jobs: int) -> Iterator[tuple[int, bytes]]:
@@ -100,6 +104,11 @@ def score_in_processes(assignment: Assignment, parts: Sequence[Part], jobs: int)
                 done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
                 yield from (future.result() for future in done)
         yield from (future.result() for future in waiting)
+
+
+def processors() -> int:
+    """How many processors this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextmanager
