@@ -150,7 +150,9 @@ def joint_executions(primitive: Primitive, tasks: Task, dts: FloatArray, n_steps
     rows = state_rows(responses, durations)
     end_rows = rows[lasts, np.arange(len(steps)), POSITION]
     system = deviation_system(primitive, durations, dts)
-    return JointExecutions(joint_model(primitive, tasks, end_rows), rows[:n_steps], system)
+    if n_steps < len(rows):  # a view would keep all of them
+        rows = rows[:n_steps].copy()
+    return JointExecutions(joint_model(primitive, tasks, end_rows), rows, system)
 
 
 def mean_positions(executions: JointExecutions) -> FloatArray:
@@ -160,7 +162,7 @@ def mean_positions(executions: JointExecutions) -> FloatArray:
     return np.asarray(np.einsum("tkn,kdn->tkd", positions, means))
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=32)
 def _start_and_parameters(primitive: Primitive) -> tuple[FloatArray, FloatArray]:
     """Mean of x, (S, N + 3), and F, (S, N + 3, r), of executions whose start is not known; kept, as they are read-only."""
     d, n = primitive.n_dof, primitive.configuration.n_basis + 3

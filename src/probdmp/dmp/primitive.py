@@ -2,7 +2,7 @@
 
 import hashlib
 from dataclasses import dataclass, fields, replace
-from functools import lru_cache
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,7 +20,7 @@ SCALING_GUARD = 0.2
 """A degree of freedom whose mean displacement is less than this fraction of its range is not scaled."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Primitive:
     """A learned movement. D degrees of freedom, N basis functions; all arrays are read-only.
 
@@ -162,7 +162,9 @@ class Primitive:
     @property
     def identity(self) -> str:
         """SHA-256 of everything that determines what the primitive does; a detector knows its primitive by it."""
-        return _identity_of(self)
+        if self not in _IDENTITIES:
+            _IDENTITIES[self] = _identity_of(self)
+        return _IDENTITIES[self]
 
     def starts(self, task: Task) -> FloatArray:
         """p0, (*batch, D) array: where a task starts, as far as it is known; the mean start elsewhere."""
@@ -179,9 +181,11 @@ class Primitive:
         return np.where(scaled, (self.goals(task) - self.starts(task)) / reference, 1.0)
 
 
-@lru_cache(maxsize=1024)
+_IDENTITIES: WeakKeyDictionary[Primitive, str] = WeakKeyDictionary()
+"""Of primitives that are in use: detectors ask for it with every execution."""
+
+
 def _identity_of(primitive: Primitive) -> str:
-    """Kept: detectors ask for it with every execution."""
     digest = hashlib.sha256()
     for field in fields(primitive):
         value = getattr(primitive, field.name)

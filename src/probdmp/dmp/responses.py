@@ -20,10 +20,12 @@ from probdmp.dmp.configuration import Configuration
 from probdmp.dmp.phase import phases_at
 from probdmp.dmp.transformation_system import DISCRETIZATIONS, spring_matrix
 
-__all__ = ["GOAL", "START_VELOCITY", "WEIGHTS", "continue_responses", "held_features", "parameter_responses"]
+__all__ = ["GOAL", "LONGEST_KEPT", "START_VELOCITY", "WEIGHTS", "continue_responses", "held_features", "parameter_responses"]
 
 START_VELOCITY, GOAL, WEIGHTS = 0, 1, slice(2, None)
 """The order of the parameters theta, in every array that has them."""
+LONGEST_KEPT = 4096
+"""Steps of a movement up to which what has been computed of it is kept for others like it."""
 
 
 def held_features(configuration: Configuration, phase_step: float, n_transitions: int, first_step: int = 0) -> FloatArray:
@@ -47,7 +49,6 @@ def held_features(configuration: Configuration, phase_step: float, n_transitions
     return features
 
 
-@lru_cache(maxsize=64)
 def parameter_responses(configuration: Configuration, phase_step: float, n_steps: int) -> FloatArray:
     """H from the start of the movement on.
 
@@ -60,12 +61,20 @@ def parameter_responses(configuration: Configuration, phase_step: float, n_steps
     -------
     (T, 3, N + 2) array, read-only: responses of acceleration, velocity and position, in phase units.
     """
+    compute = _kept_responses if n_steps <= LONGEST_KEPT else _responses
+    return compute(configuration, phase_step, n_steps)
+
+
+def _responses(configuration: Configuration, phase_step: float, n_steps: int) -> FloatArray:
     first = np.zeros((1, 3, configuration.n_basis + 2))
     first[0, 1, START_VELOCITY] = 1.0
     first[0, 0, START_VELOCITY] = spring_matrix(configuration.alpha_z, np.asarray(1.0))[0]
     first[0, 0, GOAL] = configuration.stiffness
     first[0, 0, WEIGHTS] = basis_features(np.ones(1), configuration.n_basis)[0]
     return frozen(np.concatenate([first, continue_responses(configuration, phase_step, n_steps - 1, 0, first[0])]))
+
+
+_kept_responses = lru_cache(maxsize=64)(_responses)
 
 
 def continue_responses(

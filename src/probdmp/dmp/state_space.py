@@ -26,7 +26,7 @@ from probdmp.demonstrations.demonstration import LONGEST_RECORDING
 from probdmp.dmp.forcing_term import ForcingTerm, forcing_term
 from probdmp.dmp.phase import phases_at
 from probdmp.dmp.primitive import Primitive
-from probdmp.dmp.responses import held_features
+from probdmp.dmp.responses import LONGEST_KEPT, held_features
 from probdmp.dmp.task import Task
 from probdmp.dmp.transformation_system import ACCELERATION, DISCRETIZATIONS, spring_matrix
 from probdmp.errors import InputError
@@ -122,7 +122,8 @@ def linear_gaussian_model(
 def _held_forcing(primitive: Primitive, phase_steps: FloatArray, n_steps: int, first_step: int) -> ForcingTerm:
     """The forcing term that is held over each step, (n, *batch, D); batch axes are of length 1 where all steps are alike."""
     different, where = np.unique(phase_steps, return_inverse=True)
-    alike = [_held_forcing_at(primitive, float(step), n_steps, first_step) for step in different]
+    compute = _kept_forcing_at if n_steps <= LONGEST_KEPT else _held_forcing_at
+    alike = [compute(primitive, float(step), n_steps, first_step) for step in different]
     shape = (n_steps, *(phase_steps.shape if len(alike) > 1 else (1,) * phase_steps.ndim), primitive.n_dof)
 
     def of_batch(parts: list[FloatArray]) -> FloatArray:
@@ -131,13 +132,16 @@ def _held_forcing(primitive: Primitive, phase_steps: FloatArray, n_steps: int, f
     return ForcingTerm(of_batch([part.means for part in alike]), of_batch([part.variances for part in alike]))
 
 
-@lru_cache(maxsize=64)
 def _held_forcing_at(primitive: Primitive, phase_step: float, n_steps: int, first_step: int) -> ForcingTerm:
-    """The same for one dt / T_d, (n, D); kept, as executions often differ in nothing but their start and goal."""
+    """The same for one dt / T_d, (n, D)."""
     offset = DISCRETIZATIONS[primitive.configuration.discretization].noise_offset
     steps = first_step + np.arange(n_steps, dtype=np.float64) + offset
     means = held_features(primitive.configuration, phase_step, n_steps, first_step) @ primitive.weight_means.T
     return ForcingTerm(frozen(means), frozen(forcing_term(primitive, phases_at(steps * phase_step, 1.0)).variances))
+
+
+_kept_forcing_at = lru_cache(maxsize=64)(_held_forcing_at)
+"""Executions often differ in nothing but their start and goal."""
 
 
 def _noise_correction(primitive: Primitive, phase_steps: FloatArray) -> FloatArray:

@@ -24,6 +24,8 @@ __all__ = ["LATER_CHUNK", "JointFilter", "ScheduledFilter", "joint_filter"]
 
 LATER_CHUNK = 64
 """Ticks that are prepared at a time once the movement is over."""
+LONGEST_CHUNK = 4096
+"""Ticks that are prepared before the movement begins, at most."""
 LARGEST_SCHEDULE = 2**25
 """Numbers that the gains of an execution may be; with more of them it is filtered step by step."""
 
@@ -53,7 +55,7 @@ class JointFilter:
     def __init__(self, primitive: Primitive, task: Task, dt: float, chunk: int, array: SensorArray) -> None:
         self._configuration, self._array = primitive.configuration, array
         self._duration, self._phase_step = task.duration, float(dt / task.duration)
-        executions = joint_executions(primitive, stack_tasks([task]), np.array([dt]), chunk + 1)
+        executions = joint_executions(primitive, stack_tasks([task]), np.array([dt]), min(chunk, LONGEST_CHUNK) + 1)
         self.model, self._rows = single_execution(executions)
         self._transition, self._noise = (part[0] for part in executions.system.grouped(array.is_coupled))
         self._deviation = start_deviation(self.model, array.is_coupled)
