@@ -14,6 +14,9 @@ MOST_SAMPLES = 2**19
 """Of the executions of a block together: what a few thousand short ones have."""
 
 
+DIGITS = 2.0**40
+
+
 def alike(table: ExecutionTable, owners: IntArray) -> Iterator[IntArray]:
     """Places of executions that make a block, block by block.
 
@@ -21,17 +24,23 @@ def alike(table: ExecutionTable, owners: IntArray) -> Iterator[IntArray]:
     ----------
     owners : (N,) array: which primitive each is of; -1 where it is not to be judged.
     """
-    lengths = np.diff(table.offsets)
+    lengths, steps = np.diff(table.offsets), _rounded(table.steps)
     chosen = np.flatnonzero(owners >= 0)
     if not len(chosen):
         return
-    keys = (lengths[chosen], table.steps[chosen], owners[chosen])
+    keys = (lengths[chosen], steps[chosen], owners[chosen])
     order = chosen[np.lexsort(keys)]
-    differ = np.logical_or.reduce([key[order][1:] != key[order][:-1] for key in (lengths, table.steps, owners)])
+    differ = np.logical_or.reduce([key[order][1:] != key[order][:-1] for key in (lengths, steps, owners)])
     for group in np.split(order, np.flatnonzero(differ) + 1):
         size = max(MOST_SAMPLES // int(lengths[group[0]]), 1)
         for first in range(0, len(group), size):
             yield group[first : first + size]
+
+
+def _rounded(steps: FloatArray) -> FloatArray:
+    """Seconds to twelve digits: beyond them are the roundings of the times that steps were taken from."""
+    mantissas, exponents = np.frexp(steps)
+    return np.ldexp(np.round(mantissas * DIGITS) / DIGITS, exponents)
 
 
 def observations_of(table: ExecutionTable, which: IntArray, names: Sequence[str]) -> FloatArray:

@@ -9,7 +9,7 @@ from probdmp.io import Executions, ParquetExecutions, Span
 
 __all__ = ["PART_SAMPLES", "Part", "parts_of", "repeated_ids"]
 
-PART_SAMPLES = 2**21
+PART_SAMPLES = 2**22
 """Samples of a part, about: what a run that is killed loses at most, per process."""
 
 

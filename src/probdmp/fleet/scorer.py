@@ -89,8 +89,16 @@ class Scorer:
         self._check(table, owners)
         scores = Scores(table)
         blocks = list(alike(table, np.where(table.usable, owners, -1)))
-        with ThreadPoolExecutor(self._threads) as pool:  # each writes what is about its own executions
-            list(pool.map(lambda which: self._score(table, which, int(owners[which[0]]), scores), blocks))
+
+        def score(which: IntArray) -> None:  # writes what is about its own executions, and nothing else
+            self._score(table, which, int(owners[which[0]]), scores)
+
+        if self._threads == 1:
+            for which in blocks:
+                score(which)
+        else:
+            with ThreadPoolExecutor(self._threads) as pool:
+                list(pool.map(score, blocks))
         names = np.array([*table.labels, None], dtype=object)[table.codes]
         known = np.array([*self._labels, None], dtype=object)[owners]
         return scores.as_table(np.where(owners >= 0, known, names))

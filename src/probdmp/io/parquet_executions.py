@@ -18,7 +18,7 @@ from probdmp.io.parquet_table import ExecutionTable, table_of_lists, table_of_sa
 
 __all__ = ["Executions", "ParquetExecutions", "Span"]
 
-PIECE = 2**20
+PIECE = 2**21
 """Samples that are read at a time, about."""
 FOOTER = 2**26
 """Bytes of the end of a file, at most, by which it is known again."""
