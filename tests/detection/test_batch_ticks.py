@@ -11,6 +11,7 @@ from probdmp.detection.profile import ExecutionProfile
 from probdmp.detection.recorded_sensors import NEVER, Sensing, watch_recordings
 from probdmp.detection.recorded_ticks import record_ticks
 from probdmp.detection.sensor_watch import CAUSES, SensorWatch
+from probdmp.errors import InputError
 
 DURATION, DT = 1.0, 0.013
 RANGES = np.array([2.0, 0.5, 3.0])
@@ -120,3 +121,16 @@ def test_what_is_whole_has_nothing_to_be_looked_into(seed, kind):
         assert not any(cause or stale for cause, _, _, stale, _ in said)
     elif kind == "none":
         pytest.fail("a smooth movement is whole")
+
+
+def test_a_recording_far_longer_than_the_movement_is_refused():
+    """Its ticks would take all memory there is; more likely its times are in another unit."""
+    rng, one = np.random.default_rng(0), np.ones(1)
+    told, samples = np.full((1, N_DOF), np.nan), np.array([20])
+    for dt, is_refused in ((40.0, False), (60.0, True)):
+        arguments = (sensing(), recordings(rng, 1, 20), samples, told, DURATION * one, dt * one)
+        if is_refused:
+            with pytest.raises(InputError, match="at most 1000 times as long"):
+                record_ticks(*arguments)
+        else:
+            record_ticks(*arguments)

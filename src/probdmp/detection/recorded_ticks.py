@@ -8,11 +8,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from probdmp.checks import BoolArray, FloatArray, IntArray
+from probdmp.checks import MILLISECONDS_HINT, BoolArray, FloatArray, IntArray
 from probdmp.detection.phase_clock import ROUNDING, TICKS, longest_gaps
 from probdmp.detection.recorded_sensors import NEVER, Sensing, SensorRecord, watch_recordings
+from probdmp.errors import InputError
 
 __all__ = ["RecordedTicks", "record_ticks"]
+
+LONGEST = 1000.0
+"""Times the duration that a movement should take, up to which a recording is judged."""
 
 
 class RecordedTicks(NamedTuple):
@@ -92,6 +96,13 @@ def record_ticks(
     durations, dts : (N,) arrays, seconds.
     """
     n, n_samples, n_signals = signals.shape
+    longest = float(np.max((lengths - 1) * dts / durations, initial=0.0))
+    if longest > LONGEST:
+        raise InputError(
+            f"executions at most {LONGEST:g} times as long as the movement should take",
+            f"one {longest:g} times as long",
+            MILLISECONDS_HINT,
+        )
     sensors = watch_recordings(sensing, signals, lengths, durations, dts)
     begun = np.zeros((n, n_signals), dtype=np.int64)
     odd = np.flatnonzero(~sensors.is_whole)
