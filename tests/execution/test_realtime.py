@@ -137,7 +137,7 @@ def test_ten_million_ticks_leave_a_covariance_a_covariance():
     system[:9], system[9:12], system[14] = a.ravel()[:, None], np.array([[1.0], [dt], [dt**2]]), 1.0
     system[15] = np.repeat([1e-12, 1e-2, 1e-12, 1e-2], 2)
     inputs[3] = np.repeat([1e-8, 1e-8, 1.0, 1.0], 2) * 156.25**2
-    records, rng = np.zeros((2, n + n * n + 3, width)), np.random.default_rng(0)
+    records, rng = np.zeros((2, n + n * n + 4, width)), np.random.default_rng(0)
     readings = np.where(rng.random((1000, width)) < 0.1, np.nan, 1e-3 * rng.standard_normal((1000, width)))
     for _ in range(10_000):
         for i, reading in enumerate(readings):

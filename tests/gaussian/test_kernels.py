@@ -125,7 +125,7 @@ def ticks(draw):
     width = -(-d // kernels.LANE) * kernels.LANE
     system, inputs = rng.normal(size=(n * n + 2 * n + 1, width)), rng.normal(size=(n + 1, width))
     system[-1], inputs[-1] = draw(magnitudes) * (1 + rng.random(width)), draw(magnitudes) * rng.random(width)
-    before = rng.normal(size=(n + n * n + 3, width))
+    before = rng.normal(size=(n + n * n + 4, width))
     root = rng.normal(size=(width, n, n))
     before[n : n + n * n] = (root @ root.mT).reshape(width, -1).T
     observation = rng.normal(size=d)
@@ -151,7 +151,7 @@ def test_what_cannot_be_squared_is_refused_before_anything_is_written(module, va
         pytest.skip("probdmp.gaussian._kernels was not built, or is not wanted")
     chosen = _compiled() if module == "compiled" else _kernels_numpy
     n, width = 3, kernels.LANE
-    after = np.full((n + n * n + 3, width), -7.0)
+    after = np.full((n + n * n + 4, width), -7.0)
     system, inputs = np.ones((n * n + 2 * n + 1, width)), np.ones((2, n + 1, width))
     assert chosen.filter_step(system, inputs, np.array([0.0, value]), np.ones_like(after), after, 1) == -1
     assert np.all(after == -7.0)

@@ -77,7 +77,7 @@ class ExecutionStep(NamedTuple):
     @property
     def log_likelihood(self) -> float:
         """Nats: density of the observation given the past; 0 without one."""
-        return float(self.seen.contributions.sum())
+        return self.seen.log_likelihood
 
     @property
     def contributions(self) -> FloatArray:

@@ -119,6 +119,11 @@ class ScheduledTick(NamedTuple):
         return np.asarray(self.schedule.predicted[self.tick])
 
     @property
+    def log_likelihood(self) -> float:
+        """Nats."""
+        return float(self.contributions.sum())
+
+    @property
     def contributions(self) -> FloatArray:
         """(O,) array."""
         residual = np.where(self.fused, self.innovations, 0.0)

@@ -8,8 +8,8 @@ from probdmp.checks import BoolArray, FloatArray
 
 __all__ = ["RECORD_SIZE", "RecordedTick", "SensedTick", "Tick"]
 
-RECORD_SIZE = 15
-"""Numbers about a signal: mean (3) and covariance (9) of its next state, innovation, its variance, log-likelihood."""
+RECORD_SIZE = 16
+"""Mean (3) and covariance (9) of the next state of a signal, innovation, its variance, log-likelihood, and the sum of these."""
 
 
 class SensedTick(Protocol):
@@ -31,8 +31,13 @@ class SensedTick(Protocol):
         ...
 
     @property
+    def log_likelihood(self) -> float:
+        """Nats: of this tick; 0 where nothing was measured."""
+        ...
+
+    @property
     def contributions(self) -> FloatArray:
-        """(O,) array, nats: the share of each output in the log-likelihood of this tick."""
+        """(O,) array, nats: the share of each output in it."""
         ...
 
     @property
@@ -68,6 +73,11 @@ class Tick(NamedTuple):
     fused: BoolArray
 
     @property
+    def log_likelihood(self) -> float:
+        """Nats."""
+        return float(self.contributions.sum())
+
+    @property
     def innovation_variances(self) -> FloatArray:
         """(O,) array."""
         return np.diagonal(self.innovation_covariance)
@@ -89,6 +99,11 @@ class RecordedTick(NamedTuple):
     def covariance(self) -> FloatArray:
         """(S, 3, 3) array."""
         return self.record[3:12].reshape(3, 3, -1).transpose(2, 0, 1)
+
+    @property
+    def log_likelihood(self) -> float:
+        """Nats."""
+        return self.record.item(15, 0)
 
     @property
     def contributions(self) -> FloatArray:

@@ -254,8 +254,8 @@ static PyObject *filter_step(PyObject *module, PyObject *const *arguments, Py_ss
     const Py_ssize_t n = x[1].view.shape[1] - 1;
     Py_ssize_t n_seen = 0;
     int fits = few_states(n) && agree(&x[0], "system", n * n + 2 * n + 1, stride, 0, 0)
-               && agree(&x[1], "inputs", steps, n + 1, stride, 0) && agree(&x[3], "before", n * n + n + 3, stride, 0, 0)
-               && agree(&x[4], "after", n * n + n + 3, stride, 0, 0);
+               && agree(&x[1], "inputs", steps, n + 1, stride, 0) && agree(&x[3], "before", n * n + n + 4, stride, 0, 0)
+               && agree(&x[4], "after", n * n + n + 4, stride, 0, 0);
     if (fits && (stride % WIDTH || d > stride || d <= stride - WIDTH)) {
         PyErr_Format(PyExc_ValueError, "expected rows padded from %zd to a multiple of %d, got %zd", d, WIDTH, stride);
         fits = 0;
@@ -591,7 +591,7 @@ INLINE Lane where_seen(Lane x, Lane e)
 /* ---- filter_step -------------------------------------------------------------------------------------------------------- */
 
 /* WIDTH degrees of freedom at once; each number of theirs is in a row of its own, `stride` long. Rows of `system` are A, b, c, r; of
-   `inputs` the drift and u; of a record m and V of the next tick, then e, S and the log-likelihood of this one. */
+   `inputs` the drift and u; of a record m and V of the next tick, then e, S and the log-likelihood of this one, and its sum. */
 INLINE void step_lane(int n, Py_ssize_t stride, const double *system, const double *inputs, Lane observed, const double *before,
                       double *after)
 {
@@ -673,8 +673,12 @@ static Py_ssize_t step_all(int n, Py_ssize_t n_dof, Py_ssize_t stride, const dou
         WITH_STATES(n, BODY)
 #undef BODY
     }
-    for (Py_ssize_t d = 0; d < stride; d++)
-        log_likelihood[d] = isnan(e[d]) ? 0 : -0.5 * (e[d] * e[d] / s[d] + log(s[d]) + LOG_2PI);
+    double total = 0;
+    for (Py_ssize_t d = 0; d < stride; d++) {
+        log_likelihood[d] = isnan(e[d]) || d >= n_dof ? 0 : -0.5 * (e[d] * e[d] / s[d] + log(s[d]) + LOG_2PI);
+        total += log_likelihood[d];
+    }
+    for (Py_ssize_t d = 0; d < stride; d++) log_likelihood[stride + d] = total;
     return n_seen;
 }
 
@@ -695,6 +699,8 @@ INLINE void bring_together(const Series *s, Py_ssize_t first, Py_ssize_t start, 
     for (; i + 4 <= length; i += 4)
         for (int part = 0; part < PARTS; part++) {
             Vector x[4];
+            if (i % 8 == 0) /* a cache line of the series that are next: rows are too short for the processor to guess it */
+                for (int w = 0; w < 4; w++) __builtin_prefetch(o[4 * part + w] + i + WIDTH * size);
             UNROLL for (int w = 0; w < 4; w++)
                 x[w] = *(const Anywhere *)(o[4 * part + w] + i) - *(const Anywhere *)(path[4 * part + w] + i);
             const Vector a = SHUFFLE(x[0], x[1], 0, 4, 2, 6), b = SHUFFLE(x[0], x[1], 1, 5, 3, 7);

@@ -75,8 +75,9 @@ def filter_step(
     system : (n n + 2 n + 1, W) array, rows A, b, c, r.
     inputs : (T, n + 1, W) array, drift and input variance of each step.
     observation : (D,) array.
-    before : (n + n n + 3, W) array, the record whose first rows are m and V of the state as predicted.
-    after : written, likewise: m and V of the next tick, then innovation, its variance S and log-likelihood of this one.
+    before : (n + n n + 4, W) array, the record whose first rows are m and V of the state as predicted.
+    after : written, likewise: m and V of the next tick, then innovation, its variance S and log-likelihood of this one, and the
+        sum of these.
     step : which of the inputs drives the step that follows.
 
     Returns
@@ -95,7 +96,8 @@ def filter_step(
     )
     mean, covariance = _predict(a, b, inputs[:n].T, inputs[n], mean, covariance)
     after[:n], after[n : n + n * n] = mean.T, covariance.reshape(width, -1).T
-    after[-3], after[-2], after[-1] = innovation, variance, log_likelihood
+    log_likelihood[len(observation) :] = 0.0
+    after[-4], after[-3], after[-2], after[-1] = innovation, variance, log_likelihood, log_likelihood.sum()
     return int(np.sum(~np.isnan(observation)))
 
 

@@ -113,14 +113,19 @@ def score_series(
     """
     observed, expected = _checked(gains, observations, paths)
     squares = np.empty((len(observed), observed.shape[2]))
+    if len(observed) == 0:
+        return np.zeros(0)
 
     def score(part: slice) -> None:
         own = expected if len(expected) == 1 else expected[part]
         kernels.squared_innovations(*gains.recursion, observed[part], own, squares[part])
 
-    kernels.in_threads(score, len(observed), check_count(n_threads, "n_threads", most=MOST_THREADS))
-    total = squares.sum(axis=1)
-    if total.max(initial=0.0) < LARGEST_MAGNITUDE:  # no NaN among them, and no infinity
+    if n_threads == 1:  # a single short series takes less time than to ask for threads
+        kernels.squared_innovations(*gains.recursion, observed, expected, squares)
+    else:
+        kernels.in_threads(score, len(observed), check_count(n_threads, "n_threads", most=MOST_THREADS))
+    total = np.add.reduce(squares, axis=1)
+    if np.maximum.reduce(total) < LARGEST_MAGNITUDE:  # no NaN among them, and no infinity
         return gains.constant - 0.5 * total
     incomplete = np.argwhere(~(squares < LARGEST_MAGNITUDE))
     check_array(observed[incomplete[:, 0]], "observations", ("N", *gains.path.shape), missing=True)
