@@ -4,16 +4,15 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from speed.agreement import TOLERANCE, Agreement
+from speed.causes import CAUSES
 from speed.filter_rows import COUNTS, ENOUGH, ScoringTimes
 from speed.machine import described, versions
 from speed.rows import Row, Settings
 from speed.workload import N_STEPS
 
-__all__ = ["CAUSES", "Findings", "misses", "page_text", "table", "target_lines"]
+__all__ = ["Findings", "misses", "page_text", "table", "target_lines"]
 
 MARKS = {True: "yes", False: "**no**", None: "–"}
-CAUSES: dict[str, str] = {}
-"""Why a target is missed, in words and with what shows it, by how the name of its row begins."""
 HEAD = """# Speed, measured
 
 Written by `make bench`, in one run: what is compared takes turns, each turn lasts at least 4 ms, on the last core of the
