@@ -9,13 +9,17 @@ BENCH := benchmarks/.venv
 SOURCES := $(shell find src -name '*.py')
 GALLERY := $(patsubst examples/%.py,build/gallery/%.png,$(wildcard examples/*.py))
 
-.PHONY: demo test test-slow coverage lint types docs gallery n-basis figures results variation detection bench-env bench bench-detection bench-realtime clean
+.PHONY: demo test test-numpy test-slow coverage lint types docs gallery n-basis figures results variation detection bench-env bench bench-detection bench-realtime clean
 
 demo: $(VENV)/.demo
 	$(BIN)/probdmp demo
 
 test: $(VENV)/.test
 	$(BIN)/python -m pytest -n auto --dist worksteal
+
+# The same laws of filters and steps without the compiled kernels.
+test-numpy: $(VENV)/.test
+	PROBDMP_NO_EXTENSION=1 $(BIN)/python -m pytest -n auto --dist worksteal tests/gaussian tests/execution
 
 # What takes minutes; then properties once more, on eight times as many examples.
 test-slow: $(VENV)/.test
