@@ -3,25 +3,39 @@
 __all__ = ["CAUSES"]
 
 CAUSES = {
-    "batch score against": "recordings come from memory here, since others have taken their turn in between; bringing eight of "
-    "them side by side then costs more than filtering them",
-    "NumPy twin against dynamax": "each step is ten passes over arrays of 2,048 recordings, every one of them a call",
-    "one series": "the kernel takes a small part of the call; the rest is Python: shapes, and three arrays for the result",
-    "smoother against dynamax": "three states of each sample are written, to memory that is new at every call",
-    "batch from memory": "recordings are brought side by side before they are filtered",
-    "two threads": "both cores read from one memory",
-    "online step, 7 degrees": "the target is that of a kernel with everything in place; here it is the public `step()`, most of "
-    "which is Python: the reading, the record, the result",
-    "online step, 30 degrees of freedom, `joint`": "989 unknowns are conditioned on 30 readings at each tick; the gains of a "
-    "movement of so many ticks are more than are prepared (`LARGEST_SCHEDULE` in execution/joint_steps.py)",
-    "online step, 30 degrees of freedom, `independent`": "as with 7 degrees of freedom, most of it is Python",
-    "rollout": "most of it is not the recursion but the model, its checks, and the covariances of all states, which the others "
-    "do not give",
-    "fit, one demonstration": "more is learned: a prior, the noise of sensors and of the forcing term by their likelihood, and how "
-    "certain all of it is; movement_primitives solves for the weights",
-    "`from probdmp import": "modules are compiled at every start where bytecode is not kept (PYTHONDONTWRITEBYTECODE), as it was "
-    "not here",
-    "fleet": "the verdicts: whitened windows of the trajectory take the most, the reasons of those that fail come next, and two "
-    "threads wait for each other in Python; memory goes to what is expected of 22 letters and to pieces of the file",
+    "batch score against": (
+        "recordings come from memory here, since others have taken their turn in between; bringing eight of "
+        "them side by side then costs more than filtering them"
+    ),
+    "NumPy twin against dynamax": ("each step is ten passes over arrays of 2,048 recordings, every one of them a call"),
+    "one series": ("the kernel takes a small part of the call; the rest is Python: shapes, and three arrays for the result"),
+    "smoother against dynamax": ("three states of each sample are written, to memory that is new at every call"),
+    "batch from memory": ("recordings are brought side by side before they are filtered"),
+    "two threads": ("both cores read from one memory"),
+    "online step, 7 degrees": (
+        "the target is that of a kernel with everything in place; here it is the public `step()`, most of "
+        "which is Python: the reading, the record, the result"
+    ),
+    "online step, 30 degrees of freedom, `joint`": (
+        "989 unknowns are conditioned on 30 readings at each tick; the gains of a movement of so many ticks "
+        "are more than are prepared (`LARGEST_SCHEDULE` in execution/joint_steps.py)"
+    ),
+    "online step, 30 degrees of freedom, `independent`": ("as with 7 degrees of freedom, most of it is Python"),
+    "rollout": (
+        "most of it is not the recursion but the model, its checks, and the covariances of all states, which "
+        "the others do not give"
+    ),
+    "fit, one demonstration": (
+        "more is learned: a prior, the noise of sensors and of the forcing term by their likelihood, and how "
+        "certain all of it is; movement_primitives solves for the weights"
+    ),
+    "`from probdmp import": (
+        "modules are compiled at every start where bytecode is not kept (PYTHONDONTWRITEBYTECODE), as it was not here"
+    ),
+    "fleet": (
+        "the verdicts: whitened windows of the trajectory take the most, the reasons of those that fail come "
+        "next, and two threads wait for each other in Python; memory goes to what is expected of 22 letters "
+        "and to pieces of the file"
+    ),
 }
 """In words, by how the name of a row begins."""

@@ -122,14 +122,15 @@ def squared_innovations(
     paths : what is expected without observations, (N, T, D) array, or (1, T, D) for all alike.
     squares : written, (N, D).
     """
-    for block, y in _blocks(observations, paths):
-        total = np.zeros(y.shape[1:])
-        state = np.zeros((sensor.shape[1], *total.shape))
-        for t, now in enumerate(y):
-            innovation = now - np.einsum("dn,ndk->dk", sensor, state)
-            total += innovation**2 * precisions[t, :, None]
-            state = _go_on(closed_loop[t], feedback[t], now, state)
-        squares[block] = total.T
+    with np.errstate(over="ignore", invalid="ignore"):  # what cannot be squared is looked at afterwards
+        for block, y in _blocks(observations, paths):
+            total = np.zeros(y.shape[1:])
+            state = np.zeros((sensor.shape[1], *total.shape))
+            for t, now in enumerate(y):
+                innovation = now - np.einsum("dn,ndk->dk", sensor, state)
+                total += innovation**2 * precisions[t, :, None]
+                state = _go_on(closed_loop[t], feedback[t], now, state)
+            squares[block] = total.T
 
 
 def smoothed_states(
