@@ -4,14 +4,15 @@ __all__ = ["CAUSES"]
 
 CAUSES = {
     "batch score against": (
-        "recordings come from memory here, since others have taken their turn in between; bringing eight of "
+        "not profiled; probably, recordings come from memory here, since others have taken their turn in between; "
+        "bringing eight of "
         "them side by side then costs more than filtering them"
     ),
     "NumPy twin against dynamax": ("each step is ten passes over arrays of 2,048 recordings, every one of them a call"),
     "one series": ("the kernel takes a small part of the call; the rest is Python: shapes, and three arrays for the result"),
     "smoother against dynamax": ("three states of each sample are written, to memory that is new at every call"),
     "batch from memory": ("recordings are brought side by side before they are filtered"),
-    "two threads": ("both cores read from one memory"),
+    "two threads": ("not profiled; both cores read from one memory"),
     "online step, 7 degrees": (
         "the target is that of a kernel with everything in place; here it is the public `step()`, most of "
         "which is Python: the reading, the record, the result"
