@@ -199,71 +199,100 @@ def test_series_are_smoothed_alike(arguments, seed):
 
 @st.composite
 def windows(draw):
-    """Values, rows, maps, ends, reach and wanted, as the kernels take them."""
+    """Values, rows, maps, which, ends, reach and wanted, as the kernels take them."""
     rng = np.random.default_rng(draw(seeds))
-    n, n_values, n_places, n_maps = (draw(st.integers(1, most)) for most in (40, 30, 12, 12))
+    n, n_values, n_places, n_mapped, n_maps = (draw(st.integers(1, most)) for most in (40, 30, 12, 12, 20))
     n_outputs, n_accounts, n_inputs = (draw(st.integers(1, most)) for most in (9, 5, 12))
     ends = np.unique(rng.integers(1, n_outputs + 1, draw(st.integers(1, 4))))
     wanted = np.sort(rng.integers(0, n_places + 1, len(ends)))[::-1].copy()
     reach = np.maximum.accumulate(rng.integers(1, n_inputs + 1, n_outputs))
-    maps = rng.normal(size=(n_maps, n_outputs, n_accounts, n_inputs))
-    maps *= (np.arange(n_inputs) < reach[:, None])[:, None]
-    rows = rng.integers(0, n_values, (n_places, n_inputs))
-    return rng.normal(size=(n_values, n)), rows, maps, ends, reach, wanted
+    maps = rng.normal(size=(n_maps, n_outputs, n_inputs)) * (np.arange(n_inputs) < reach[:, None])
+    rows, which = rng.integers(0, n_values, (n_places, n_inputs)), rng.integers(0, n_maps, (n_mapped, n_accounts))
+    return rng.normal(size=(n_values, n)), rows, maps, which, ends, reach, wanted
 
 
 def squared(module, arguments):
-    found = np.full(int(arguments[5].sum()) * arguments[2].shape[2] * arguments[0].shape[1], -7.0)
+    found = np.full(int(arguments[6].sum()) * arguments[3].shape[1] * arguments[0].shape[1], -7.0)
     module.whitened_squares(*arguments, found)
+    return found
+
+
+def squares_one_by_one(values, rows, maps, which, ends, wanted):
+    """(wanted, A, n) arrays, each window by itself."""
+    mapped = [maps[which[min(place, len(which) - 1)]] for place in range(len(rows))]
+    found = []
+    for end, count in zip(ends, wanted, strict=True):
+        some = [np.sum((mapped[place][:, :end] @ values[rows[place]]) ** 2, axis=1) for place in range(count)]
+        found.append(np.array(some).reshape(count, which.shape[1], values.shape[1]))
     return found
 
 
 @given(windows())
 def test_squares_of_windows_are_those_of_each_by_itself(arguments):
-    values, rows, maps, ends, _, wanted = arguments
-    expected = []
-    for end, count in zip(ends, wanted, strict=True):
-        for place in range(count):
-            white = maps[min(place, len(maps) - 1), :end] @ values[rows[place]]
-            expected.append(np.sum(white**2, axis=0).ravel())
-    expected = np.concatenate(expected) if expected else np.empty(0)
+    values, rows, maps, which, ends, _, wanted = arguments
+    expected = np.concatenate([some.ravel() for some in squares_one_by_one(values, rows, maps, which, ends, wanted)])
     for module in {_kernels_numpy, _compiled() if kernels.COMPILED else _kernels_numpy}:
         assert_same(squared(module, arguments), expected)
 
 
-@given(seeds, st.integers(0, 6), st.integers(1, 8), st.integers(1, 40), st.integers(1, 40))
-def test_mixtures_are_sums_of_densities(seed, n_places, n_accounts, n, n_halves):
+@given(windows(), seeds, st.integers(1, 40), st.sampled_from([1.0, 1e6, 1e-6]))
+def test_mixtures_are_sums_of_densities(arguments, seed, most_halves, scale):
+    values, rows, maps, which, ends, _, wanted = arguments
     rng = np.random.default_rng(seed)
-    squares, scales = rng.exponential(size=(n_places, n_accounts, n)) * 30, np.exp(rng.normal(size=(n_places, n_accounts)))
-    expected = np.log(np.sum((scales[..., None] * (1 + squares / 4)) ** (-n_halves / 2), axis=1))
+    scales = scale * np.exp(rng.normal(size=(len(which), len(ends), which.shape[1])))
+    n_halves = rng.integers(1, most_halves + 1, len(ends))
+    expected = []
+    for j, squares in enumerate(squares_one_by_one(values, rows, maps, which, ends, wanted)):
+        own = scales[np.minimum(np.arange(len(squares)), len(scales) - 1), j]
+        bases = np.log(own)[..., None] + np.log1p(squares / 4)
+        expected.append(np.logaddexp.reduce(-n_halves[j] / 2 * bases, axis=1).ravel())
     for module in {_kernels_numpy, _compiled() if kernels.COMPILED else _kernels_numpy}:
-        mixed = np.full((n_places, n), -7.0)
-        module.log_mixtures(squares, scales, mixed, n_halves, 4.0)
-        assert_same(mixed, expected)
+        mixed = np.full(int(wanted.sum()) * values.shape[1], -7.0)
+        module.window_mixtures(*arguments, scales, n_halves, mixed, 4.0)
+        assert_same(mixed, np.concatenate(expected))
 
 
 @needs_extension
-@pytest.mark.parametrize("fault", ["rows", "negative rows", "ends", "reach", "wanted", "found"])
+@pytest.mark.parametrize("square", [0.0, 1e-300, 1e-30, 1.0, 2.0, 1e30, 1e280])
+def test_logarithms_of_mixtures_are_those_of_the_library(square):
+    """Of one account to the power 1: -ln (scale (1 + square / freedom)), over all magnitudes that there are."""
+    values = np.full((1, 11), np.sqrt(square))
+    one, zero = np.ones(1, dtype=np.int64), np.zeros((1, 1), dtype=np.int64)
+    least = float(np.finfo(float).tiny)
+    for scale in (least / 8, least, 1e-20, 0.5, 0.7071067811865475, 1.0, 1.4142135623730951, 1e20):
+        found = np.empty(11)
+        arguments = values, zero, np.ones((1, 1, 1)), zero, one, one, one, np.full((1, 1, 1), scale), 2 * one
+        _compiled().window_mixtures(*arguments, found, 4.0)
+        expected = -np.log(scale + scale / 4 * np.sqrt(square) ** 2)
+        np.testing.assert_allclose(found, expected, rtol=1e-15, atol=1e-15)
+
+
+@needs_extension
+@pytest.mark.parametrize("fault", ["rows", "negative rows", "which", "ends", "reach", "falling reach", "wanted", "found"])
 def test_windows_that_are_not_there_are_refused(fault):
-    values, maps = np.ones((5, 3)), np.ones((2, 4, 1, 2))
-    rows, ends, reach = np.zeros((6, 2), dtype=np.int64), np.array([2, 4]), np.array([1, 1, 2, 2])
-    wanted = np.array([6, 3])
+    values, maps = np.ones((5, 3)), np.ones((2, 4, 2))
+    rows, which = np.zeros((6, 2), dtype=np.int64), np.array([[0], [1], [1]])
+    ends, reach, wanted = np.array([2, 4]), np.array([1, 1, 2, 2]), np.array([6, 3])
     found = np.empty(9 * 3)
-    _compiled().whitened_squares(values, rows, maps, ends, reach, wanted, found)
+    _compiled().whitened_squares(values, rows, maps, which, ends, reach, wanted, found)
     if fault == "rows":
         rows[3, 1] = 5
     elif fault == "negative rows":
         rows[3, 1] = -1
+    elif fault == "which":
+        which[1] = 2
     elif fault == "ends":
         ends[1] = 5
     elif fault == "reach":
-        reach[0] = 3
+        reach[3] = 3
+    elif fault == "falling reach":
+        reach[0] = 2
     elif fault == "wanted":
         wanted[0], found = 7, np.empty(10 * 3)
     else:
         found = np.empty(8 * 3)
     with pytest.raises(ValueError, match="do not belong together"):
-        _compiled().whitened_squares(values, rows, maps, ends, reach, wanted, found)
+        _compiled().whitened_squares(values, rows, maps, which, ends, reach, wanted, found)
 
 
 @needs_extension

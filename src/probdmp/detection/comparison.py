@@ -57,7 +57,8 @@ class Candidates(NamedTuple):
         phases = np.clip(np.rint(TICKS * times / self.durations[:, None]).astype(int), 0, TICKS)
         residuals = (displacements / self.ranges[:, None] - self.means[r, phases]).reshape(len(r), n * d)
         rows = (phases[..., None] * d + np.arange(d)).reshape(len(r), n * d)
-        covariances = self.covariances[r[..., None], rows[:, :, None], rows[:, None, :]]
+        places = (r[..., None] * self.covariances.shape[1] + rows[:, :, None]) * self.covariances.shape[1] + rows[:, None, :]
+        covariances = self.covariances.ravel().take(places)
         covariances[:, np.arange(n * d), np.arange(n * d)] += np.tile(self.noise_variances, n)
         white, logarithms = whitened(covariances, residuals)
         squares, nu, size = (white**2).sum(axis=1), DEGREES_OF_FREEDOM, n * d

@@ -11,12 +11,12 @@ Under each the execution is a draw from a Gaussian over paths. The explanation w
 explain what came after its onset about as well as ordinary executions are explained.
 """
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from probdmp.checks import FloatArray
+from probdmp.checks import FloatArray, IntArray
 from probdmp.detection.evidence import DEGREES_OF_FREEDOM
 from probdmp.detection.path_model import PathModel
 from probdmp.detection.phase_clock import TICKS
@@ -58,26 +58,34 @@ class Diagnosis(NamedTuple):
 
 
 def diagnose(
-    model: PathModel, means: FloatArray, recent: Sequence[FloatArray], tick: int, noise_stds: FloatArray, seen_since: int
-) -> Diagnosis:
-    """Motion or timing, and what in particular.
+    model: PathModel, means: FloatArray, recent: FloatArray, ticks: IntArray, noise_stds: FloatArray, seen_since: IntArray
+) -> list[Diagnosis]:
+    """Motion or timing, and what in particular, of n executions.
 
     Parameters
     ----------
-    means : (M, D) array, mean path of the execution.
-    recent : displacements (D,) at the last ticks, the latest last.
-    tick : of the latest, since the start.
+    means : (n, M, D) array, mean path of each execution.
+    recent : (n, L, D) array: displacements at the last ticks, the latest last; NaN where nothing was seen, or before the start.
+    ticks : (n,) array: of the latest, since the start.
     noise_stds : (D,) array, noise of the sensor as a fraction of the range.
-    seen_since : ticks since the alarm.
+    seen_since : (n,) array: ticks since the alarm.
     """
-    n_rest = min(REST_TICKS[0] + seen_since, REST_TICKS[1])
-    if _is_held(means, list(recent), tick, REST_EXTENT + 1.5 * noise_stds, n_rest):
-        return Diagnosis("timing", "held")
-    back = np.array([j for j in LOOKED_AT if j < len(recent) and not np.isnan(recent[-1 - j]).any()], dtype=int)
+    n_rest = np.minimum(REST_TICKS[0] + seen_since, REST_TICKS[1])
+    held = _are_held(means, recent, ticks, REST_EXTENT + 1.5 * noise_stds, n_rest)
+    return [
+        Diagnosis("timing", "held") if is_held else _explained(model, mean, path, int(tick))
+        for is_held, mean, path, tick in zip(held.tolist(), means, recent, ticks, strict=True)
+    ]
+
+
+def _explained(model: PathModel, means: FloatArray, recent: FloatArray, tick: int) -> Diagnosis:
+    """What happened to one execution that is not held."""
+    back = LOOKED_AT[len(recent) > LOOKED_AT]
+    back = back[~np.isnan(recent[-1 - back]).any(axis=1)]
     explanations = _explanations(int(back.max()) if len(back) else 0)
     if len(explanations.onsets) < 2:
         return Diagnosis("motion", "off the path")
-    density, follows = _fit(model, means, np.stack([recent[-1 - j] for j in back]), tick - back, tick, explanations)
+    density, follows = _fit(model, means, recent[-1 - back], tick - back, tick, explanations)
     best, speed = int(np.argmax(density)), float(explanations.speeds[np.argmax(density)])
     if speed == 1 or density[best] < density[0] + CLEARLY or follows[best] > FOLLOWS:
         return Diagnosis("motion", "off the path")
@@ -86,24 +94,28 @@ def diagnose(
     return Diagnosis("timing", "slow" if speed < 1 else "fast")
 
 
-def _is_held(means: FloatArray, recent: Sequence[FloatArray], tick: int, extents: FloatArray, n_rest: int) -> bool:
-    """Whether it has not moved for some ticks, while it should have.
+def _are_held(
+    means: FloatArray, recent: FloatArray, ticks: IntArray, extents: FloatArray, n_rest: IntArray
+) -> NDArray[np.bool_]:
+    """(n,) array: whether executions have not moved for some ticks, while they should have.
 
     Parameters
     ----------
     extents : (D,) array, root mean square by which what is at rest still seems to move.
+    n_rest : (n,) array: ticks that count.
     """
-    latest = np.stack(recent[-n_rest:])
-    latest = latest[~np.isnan(latest).any(axis=1)]
-    if len(latest) < REST_TICKS[0]:
-        return False
-    place = latest.mean(axis=0)
-    if np.any(np.sqrt(np.mean((latest - place) ** 2, axis=0)) > extents):
-        return False
-    moved = np.flatnonzero(np.any(np.abs(np.stack(recent[::-1]) - place) > 3 * extents, axis=1))
-    since = int(moved[0]) if len(moved) else len(recent)
-    due = means[min(tick, TICKS)] - means[min(max(tick - since, 0), TICKS)]
-    return bool(np.any(np.abs(due) > np.maximum(5 * extents, LEAST_DUE)))
+    n_ticks, executions = recent.shape[1], np.arange(len(recent))
+    is_latest = np.arange(n_ticks) >= n_ticks - n_rest[:, None]
+    counted = is_latest & ~np.isnan(recent).any(axis=2)
+    latest, counts = np.where(counted[..., None], recent, 0.0), np.maximum(counted.sum(axis=1), 1)[:, None]
+    places = latest.sum(axis=1) / counts
+    away = recent - places[:, None]
+    spread = np.sqrt(np.sum(np.where(counted[..., None], away, 0.0) ** 2, axis=1) / counts)
+    at_rest = (counted.sum(axis=1) >= REST_TICKS[0]) & np.all(spread <= extents, axis=1)
+    moved = np.any(np.abs(away) > 3 * extents, axis=2)[:, ::-1]
+    since = np.where(moved.any(axis=1), np.argmax(moved, axis=1), np.minimum(ticks + 1, n_ticks))
+    due = means[executions, np.minimum(ticks, TICKS)] - means[executions, np.clip(ticks - since, 0, TICKS)]
+    return np.asarray(at_rest & np.any(np.abs(due) > np.maximum(5 * extents, LEAST_DUE), axis=1))
 
 
 class _Explanations(NamedTuple):
@@ -147,9 +159,8 @@ def _fit(
     widths = explanations.widths[:, None]
     bumps = np.where(since < widths, np.sin(np.pi * since / np.maximum(widths, 1)) ** 2, 0.0)
     aside = ASIDE_STD * (np.minimum(since / explanations.rises[:, None], 1.0) + bumps)
-    whole = model.covariance.reshape(model.means.size, -1)
     rows = (phases[..., None] * dof + np.arange(dof)).reshape(count, points * dof)
-    covariances = whole[rows[:, :, None], rows[:, None, :]]
+    covariances = model.covariance.ravel().take(rows[:, :, None] * model.means.size + rows[:, None, :])
     by_dof = covariances.reshape(count, points, dof, points, dof)
     moved = aside[:, :, None] * aside[:, None, :]
     for d in range(dof):

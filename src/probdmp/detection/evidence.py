@@ -18,9 +18,8 @@ from probdmp.checks import FloatArray, IntArray
 from probdmp.detection.path_model import PathModel
 from probdmp.detection.phase_clock import TICKS
 from probdmp.detection.trajectory_statistics import SHIFT_STD
-from probdmp.detection.window_maps import WindowInputs, WindowMaps
+from probdmp.detection.window_maps import Densities, WindowInputs, WindowMaps, linear_maps
 from probdmp.detection.windows import PathWindows, inverse_of_cholesky
-from probdmp.gaussian import kernels
 
 __all__ = ["DEGREES_OF_FREEDOM", "EVIDENCE", "Evidence", "Foreseen", "Pace", "Standstill"]
 
@@ -71,13 +70,10 @@ class Foreseen:
         -------
         J arrays (wanted, n).
         """
-        squares, mixtures = self._windows.squares(inputs, offsets, points, wanted), []
-        for some, n in zip(squares, points.tolist(), strict=True):
-            bases = np.ascontiguousarray(self._bases[: len(some), :, n - 1])
-            mixed = np.empty((len(some), some.shape[2]))
-            kernels.log_mixtures(some, bases, mixed, int(DEGREES_OF_FREEDOM) + n * self._dof, DEGREES_OF_FREEDOM)
-            mixtures.append(mixed)
-        return mixtures
+        ends, dof = points * self._dof, self._dof
+        bases = np.ascontiguousarray(self._bases[..., points - 1].swapaxes(1, 2))
+        densities = Densities(bases, int(DEGREES_OF_FREEDOM) + ends, DEGREES_OF_FREEDOM)
+        return self._windows.maps.mixtures(inputs, np.repeat(offsets, dof), ends, wanted, densities)
 
     def looks(self, points: IntArray, places: IntArray) -> "Looks":
         """Ready to be asked about the first points and all points of single executions.
@@ -156,8 +152,11 @@ class Standstill:
         points = np.array([before, *(before + self._points_at)])
         offsets = np.concatenate([-self.before, self.ahead])
         here, *together = self._going_on.mixtures(inputs, offsets, points, np.array([wanted[0], *wanted]))
-        resting = self._resting(inputs.paths[:, : len(self._rest_stds)], wanted)
-        return [rest - (mixed - here[: len(mixed)]) for rest, mixed in zip(resting, together, strict=True)]
+        resting = self._resting(inputs, wanted)
+        for rest, mixed in zip(resting, together, strict=True):
+            rest -= mixed
+            rest += here[: len(rest)]
+        return resting
 
     @cached_property
     def _looks(self) -> Looks:
@@ -190,24 +189,23 @@ class Standstill:
         distances = (np.add.reduceat(moved, starts) - sums * sums / (self._points_at[:, None] + 1)).sum(axis=1)
         return np.asarray(self._constants - distances / 2 - (together - here))
 
-    def _resting(self, paths: FloatArray, wanted: IntArray) -> list[FloatArray]:
-        """Log-densities of what follows places of paths (T, D, n) up to each horizon, if it is all where it is there."""
-        found: list[FloatArray] = []
-        done, scales = 0, 1 / self._rest_stds[:, None]
-        here = paths[: wanted[0]] * scales
-        sums, squares = np.zeros((2, *here.shape))
-        for count, points in zip(wanted, self._points_at, strict=True):
-            here, sums, squares = here[:count], sums[:count], squares[:count]
-            for ahead in self.ahead[done:points]:
-                moved = paths[ahead : ahead + count] * scales
-                moved -= here
-                sums += moved
-                squares += np.square(moved, out=moved)
-            done = points
-            # (1 1^T + I)^-1 = I - 1 1^T / (n + 1)
-            distances = (squares - sums**2 / (points + 1)).sum(axis=1)
-            found.append(self._constants[len(found)] - distances / 2)
-        return found
+    def _resting(self, inputs: WindowInputs, wanted: IntArray) -> list[FloatArray]:
+        """Log-densities of what follows places up to each horizon, if it is all where it is there: J arrays (wanted, n)."""
+        dof = len(self._rest_stds)
+        squares = self._rest_maps.squares(inputs, np.repeat([0, *self.ahead], dof), self._points_at * dof, wanted)
+        for some, constant in zip(squares, self._constants.tolist(), strict=True):
+            some *= -0.5
+            some += constant
+        return [some[:, 0] for some in squares]
+
+    @cached_property
+    def _rest_maps(self) -> WindowMaps:
+        """Of a place and what follows it, that have to do with nothing else, to white noise if it is at rest."""
+        since = np.hstack([-self._rest_whitening.sum(axis=1, keepdims=True), self._rest_whitening])
+        whitening = np.kron(since, np.diag(1 / self._rest_stds))[None]
+        size, dof = whitening.shape[2], len(self._rest_stds)
+        signals = np.tile(np.arange(dof), size // dof)
+        return linear_maps(whitening, np.zeros((1, size)), np.zeros((1, size, dof)), signals, np.zeros((1, 1), dtype=np.int64))
 
     def _rest_constants(self, points: int) -> float:
         """ln of the density of so many points where it is largest."""

@@ -14,7 +14,7 @@ from probdmp.checks import BoolArray, FloatArray, IntArray
 from probdmp.detection.calibrated_monitor import LOOKED_AT_AGAIN
 from probdmp.detection.calibration import Calibration
 from probdmp.detection.expectation import Expectation
-from probdmp.detection.reasons import LOOKED_BACK, REMEMBERED, better_fit, reason_for, signal_shares
+from probdmp.detection.reasons import LOOKED_BACK, REMEMBERED, better_fit, reasons_for, signal_shares
 from probdmp.detection.recorded_sensors import NEVER
 from probdmp.detection.recorded_ticks import RecordedTicks
 from probdmp.detection.sensor_watch import CAUSES
@@ -125,7 +125,8 @@ def judge_recorded(
 def _moments(standard: Standard, values: FloatArray) -> _Moments:
     """The first alarm of each execution, or where it comes nearest to one, by values (C, T, N)."""
     calibration, (n_channels, _, n) = standard.calibration, values.shape
-    largest = calibration.surprise(np.fmax.reduce(values, axis=1).T).max(axis=-1)
+    highest = np.fmax.reduce(values, axis=1)
+    largest = calibration.surprise(highest.T).max(axis=-1)
     nothing = np.zeros(n, dtype=np.int64)
     moments = _Moments(nothing, nothing.copy(), largest / standard.threshold, np.zeros(n, dtype=np.bool_))
     suspects = np.flatnonzero(moments.ratios > 1)
@@ -133,7 +134,9 @@ def _moments(standard: Standard, values: FloatArray) -> _Moments:
     least[:, suspects] = np.inf
     first = np.full(n, NEVER)  # by tick, then by channel
     for channel in range(n_channels):
-        ticks, k = np.nonzero(values[channel] >= least[channel])
+        chosen = np.flatnonzero(highest[channel] >= least[channel])
+        ticks, places = np.nonzero(values[channel][:, chosen] >= least[channel, chosen])
+        k = chosen[places]
         is_largest = calibration.surprise_of(channel, values[channel, ticks, k]) >= largest[k] * (1 - TIE)
         np.minimum.at(first, k[is_largest], ticks[is_largest] * n_channels + channel)
     moments.ticks[:] = np.where(first < NEVER, first // n_channels, -1)
@@ -186,14 +189,19 @@ def _reasons(
     texts[0, by_silence], texts[1, by_silence] = "data missing", "nothing measured"
     is_faulty = recorded.sensors.faulty_from < NEVER
     texts[0, is_faulty], texts[1, is_faulty] = "sensor", [CAUSES[c] for c in recorded.sensors.causes[is_faulty]]
-    d = expectation.primitive.n_dof
-    for k in np.flatnonzero(by_tick & ~is_faulty):
-        alarm, path = moments.ticks[k], recorded.paths[k, : recorded.counts[k], :d]
-        since = max(later for later in LOOKED_AT_AGAIN if alarm + later < len(path))
-        now = int(_shown(recorded.steps[k : k + 1], alarm + since)[0])
-        means = expectation.trajectory.model.means_for(recorded.goals[k : k + 1])[0]
-        recent = path[max(now + 1 - LOOKED_BACK, 0) : now + 1]
-        kind, cause = reason_for(expectation, means, list(recent), now, int(moments.channels[k]), since)
-        better = better_fit(expectation, path[: min(now, REMEMBERED) + 1], float(durations[k])) if kind == "motion" else ""
+    chosen, paths = np.flatnonzero(by_tick & ~is_faulty), recorded.paths[..., : expectation.primitive.n_dof]
+    if not len(chosen):
+        return texts
+    later = np.array(LOOKED_AT_AGAIN)
+    is_there = moments.ticks[chosen, None] + later < recorded.counts[chosen, None]
+    since = np.where(is_there, later, 0).max(axis=1)
+    ticks = _shown(recorded.steps[chosen], moments.ticks[chosen] + since)
+    back = ticks[:, None] + np.arange(1 - LOOKED_BACK, 1)
+    recent = np.where((back >= 0)[..., None], paths[chosen[:, None], np.maximum(back, 0)], np.nan)
+    means = expectation.trajectory.model.means_for(recorded.goals[chosen])
+    reasons = reasons_for(expectation, means, recent, ticks, moments.channels[chosen], since)
+    for k, tick, (kind, cause) in zip(chosen.tolist(), ticks.tolist(), reasons, strict=True):
+        is_motion = kind == "motion"
+        better = better_fit(expectation, paths[k, : min(tick, REMEMBERED) + 1], float(durations[k])) if is_motion else ""
         texts[:, k] = kind, cause, better
     return texts

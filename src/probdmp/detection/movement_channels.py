@@ -58,4 +58,8 @@ class Horizon(NamedTuple):
 
 def as_suspicion(evidence: FloatArray) -> FloatArray:
     """Nats of evidence as a positive number with a tail like those of squared distances."""
-    return np.exp(np.minimum(np.maximum(evidence, -LARGEST_LOG_RATIO), LARGEST_LOG_RATIO) / EVIDENCE_SCALE)
+    suspicion = np.array(evidence)
+    np.clip(suspicion, -LARGEST_LOG_RATIO, LARGEST_LOG_RATIO, out=suspicion)
+    suspicion /= EVIDENCE_SCALE
+    np.exp(suspicion, out=suspicion)
+    return suspicion

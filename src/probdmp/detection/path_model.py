@@ -56,7 +56,8 @@ class PathModel:
     def of_movement(self) -> "PathModel":
         """Without the channels."""
         d = self.goal_gains.shape[-1]
-        return PathModel(self.means[:, :d], self.covariance[:, :d, :, :d], self.goal_gains[:, :d], self.noise_variances[:d])
+        covariance = np.ascontiguousarray(self.covariance[:, :d, :, :d])
+        return PathModel(self.means[:, :d], covariance, self.goal_gains[:, :d], self.noise_variances[:d])
 
 
 def path_model(primitive: Primitive, profile: ExecutionProfile, knows_goal: bool) -> PathModel:

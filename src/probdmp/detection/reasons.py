@@ -1,6 +1,6 @@
 """Who is to blame for what a channel has noticed, and why it did: the same while an execution runs and of recordings."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from probdmp.detection.innovation_watch import watched_sensors
 from probdmp.detection.phase_clock import TICKS
 from probdmp.detection.trajectory_model import MOVEMENT_CHANNELS, TrajectoryModel
 
-__all__ = ["LOOKED_BACK", "REMEMBERED", "better_fit", "reason_for", "signal_shares"]
+__all__ = ["LOOKED_BACK", "REMEMBERED", "better_fit", "reasons_for", "signal_shares"]
 
 LOOKED_BACK = int(LOOKED_AT.max()) + 1
 REMEMBERED = 2 * TICKS
@@ -57,28 +57,34 @@ def signal_shares(
     return shares
 
 
-def reason_for(
-    expectation: Expectation, means: FloatArray, recent: Sequence[FloatArray], tick: int, channel: int, seen_since: int
-) -> Diagnosis:
-    """From the last ticks; what a channel has noticed is about that channel, unless the movement is late.
+def reasons_for(
+    expectation: Expectation, means: FloatArray, recent: FloatArray, ticks: IntArray, channels: IntArray, seen_since: IntArray
+) -> list[Diagnosis]:
+    """From the last ticks of n executions; what a channel has noticed is about that channel, unless the movement is late.
 
     Parameters
     ----------
-    means : (M, D) array, mean path of the execution.
-    recent : displacements (D,) at the last ticks, `LOOKED_BACK` of them at the most.
-    tick : the last of them, since the start.
-    seen_since : ticks since the channel has raised the alarm.
+    means : (n, M, D) array, mean path of each execution.
+    recent : (n, L, D) array: displacements at the last ticks, `LOOKED_BACK` of them at the most; NaN before the start.
+    ticks : (n,) array: the last of them, since the start.
+    channels : (n,) array: the one that has raised the alarm.
+    seen_since : (n,) array: ticks since then.
     """
-    primitive, array = expectation.primitive, expectation.array
-    further = channel - len(MOVEMENT_CHANNELS)
+    primitive = expectation.primitive
     noise = expectation.profile.noise_stds[: primitive.n_dof] / primitive.ranges
-    found = diagnose(expectation.trajectory.model, means, recent, tick, noise, seen_since)
-    if further < 0 or found.cause in LATE:
-        return found
-    if further >= len(primitive.channel_names):
-        sensor = watched_sensors(array)[further - len(primitive.channel_names)]
-        return Diagnosis("motion", f"unexpected readings of {sensor}")
-    return Diagnosis("channel", f"unexpected {primitive.channel_names[further]}")
+    found = diagnose(expectation.trajectory.model, means, recent, ticks, noise, seen_since)
+    further = channels - len(MOVEMENT_CHANNELS)
+    return [
+        one if channel < 0 or one.cause in LATE else _about_channel(expectation, channel)
+        for one, channel in zip(found, further.tolist(), strict=True)
+    ]
+
+
+def _about_channel(expectation: Expectation, further: int) -> Diagnosis:
+    names = expectation.primitive.channel_names
+    if further >= len(names):
+        return Diagnosis("motion", f"unexpected readings of {watched_sensors(expectation.array)[further - len(names)]}")
+    return Diagnosis("channel", f"unexpected {names[further]}")
 
 
 def better_fit(expectation: Expectation, path: FloatArray, duration: float) -> str:

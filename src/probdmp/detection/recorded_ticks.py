@@ -110,8 +110,12 @@ def record_ticks(
     begun[odd] = np.where(seen.any(axis=1), np.argmax(seen, axis=1), NEVER)
     first = np.take_along_axis(sensors.believed, np.minimum(begun, n_samples - 1)[:, None], axis=1)[:, 0]
     starts, d = np.where(np.arange(n_signals) < sensing.n_dof, first, 0.0), sensing.n_dof
-    displaced = (sensors.believed - starts[:, None]) / sensing.ranges
-    paths, steps = _ticks_of(Clocks.of(sensing.profile.usual_gaps, durations, dts), displaced, lengths, sensors.is_whole)
+    clocks = Clocks.of(sensing.profile.usual_gaps, durations, dts)
+    paths, steps = _ticks_of(clocks, sensors.believed, lengths, sensors.is_whole)
+    paths -= starts[:, None]
+    paths /= sensing.ranges
+    if np.any(steps[:, -1] == NEVER):
+        paths[steps == NEVER] = 0.0
     # What is told of the goal counts from the start as it was known with the first tick.
     known = (begun[:, :d] <= steps[:, :1]) & (steps[:, :1] < NEVER)
     ahead = np.where(known, (goals - starts[:, :d]) / sensing.ranges[:d], np.nan)
@@ -127,10 +131,7 @@ def _ticks_of(clocks: Clocks, values: FloatArray, lengths: IntArray, is_whole: B
         paths, steps = np.empty((len(values), n_ticks, values.shape[2])), np.empty((len(values), n_ticks), dtype=np.int64)
         for chosen, fill in ((is_whole, _fill_whole), (~is_whole, _fill)):
             paths[chosen], steps[chosen] = fill(clocks.chosen(chosen), values[chosen], n_ticks)
-    steps = np.where(steps < lengths[:, None], steps, NEVER)
-    if np.any(steps[:, -1] == NEVER):
-        paths = np.where((steps < NEVER)[..., None], paths, 0.0)
-    return paths, steps
+    return paths, np.where(steps < lengths[:, None], steps, NEVER)
 
 
 def _fill_whole(clocks: Clocks, values: FloatArray, n_ticks: int) -> tuple[FloatArray, IntArray]:
@@ -165,14 +166,17 @@ def _lines(
 ) -> tuple[FloatArray, BoolArray]:
     """Values at ticks (K, 1) on the lines through samples before and after them, (N, K, S), and whether these are near."""
     now, last = clocks.at(after), clocks.at(before)
-    ends, begins = _at(values, after), _at(values, before)
-    slopes = (ends - begins) / np.maximum(now - last, ROUNDING)
-    beyond = np.where(clocks.is_at(after, ticks), 0.0, now - ticks)
-    return ends - np.where(beyond == 0, 0.0, slopes * beyond), now - last <= clocks.gaps
+    beyond = np.where(clocks.is_at(after, ticks), 0.0, now - ticks) / np.maximum(now - last, ROUNDING)
+    ends, lines = _at(values, after), _at(values, before)
+    lines -= ends
+    lines *= beyond
+    np.copyto(lines, 0.0, where=beyond == 0)  # there may be nothing before
+    lines += ends
+    return lines, now - last <= clocks.gaps
 
 
 def _at(values: FloatArray, samples: IntArray) -> FloatArray:
     """Values (N, T, S) at samples (N or 1, K, S or 1)."""
     if len(samples) == 1 and samples.shape[2] == 1:
-        return values[:, samples[0, :, 0]]
+        return np.take(values, samples[0, :, 0], axis=1)
     return np.take_along_axis(values, np.broadcast_to(samples, (len(values), *samples.shape[1:])), axis=1)

@@ -117,11 +117,11 @@ class SensorWatch:
 
     def is_plain(self, recorded: FloatArray) -> BoolArray:
         """(N,) array: whether of a whole recording, (N, T, S), all is measured and believed, and nothing repeats."""
-        steps = np.diff(recorded, axis=1)
-        jumps = np.abs(np.diff(steps, axis=1)) <= self._largest_jumps
-        # A difference of exactly zero is a repetition; of what was not measured, it is NaN.
-        moves = (steps != 0) & ~np.isnan(steps)
-        return jumps.all(axis=(1, 2)) & moves.all(axis=(1, 2)) & ~np.isnan(recorded[:, 0]).any(axis=-1)
+        steps = recorded[:, 1:] - recorded[:, :-1]
+        moves = steps.all(axis=(1, 2))  # a difference of exactly zero is a repetition
+        jumps = steps[:, 1:] - steps[:, :-1]
+        np.abs(jumps, out=jumps)
+        return np.asarray(moves & (jumps <= self._largest_jumps).all(axis=(1, 2)))  # not so of NaN: of what was not measured
 
     def believe(self, measured: FloatArray) -> FloatArray:
         """The sample (*batch, S) without what is suspicious of it, which is NaN instead; units of each signal."""

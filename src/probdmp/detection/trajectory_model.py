@@ -38,7 +38,7 @@ __all__ = [
     "channels_for",
 ]
 
-SIDE_BY_SIDE = 512
+SIDE_BY_SIDE = 256
 """Executions that are judged side by side: so many that calls do not count, so few that their numbers stay at hand."""
 
 

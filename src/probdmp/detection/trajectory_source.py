@@ -9,7 +9,7 @@ from probdmp.detection.diagnosis import Diagnosis
 from probdmp.detection.execution_ticks import ExecutionTicks
 from probdmp.detection.expectation import Expectation
 from probdmp.detection.innovation_watch import InnovationWatch
-from probdmp.detection.reasons import LOOKED_BACK, REMEMBERED, better_fit, reason_for, signal_shares
+from probdmp.detection.reasons import LOOKED_BACK, REMEMBERED, better_fit, reasons_for, signal_shares
 from probdmp.detection.sensor_watch import SensorWatch
 from probdmp.detection.trajectory_model import MOVEMENT_CHANNELS, TrajectoryFollower
 from probdmp.dmp import Task
@@ -79,7 +79,8 @@ class TrajectorySource:
         if self._follower is None:
             return Diagnosis("motion", "off the path")
         means = self._follower.means[:, : self._expectation.primitive.n_dof]
-        return reason_for(self._expectation, means, self._recent, self._tick, channel, seen_since)
+        moment = np.array([self._tick]), np.array([channel]), np.array([seen_since])
+        return reasons_for(self._expectation, means[None], np.stack(self._recent)[None], *moment)[0]
 
     def better(self) -> str:
         """Label of the primitive of the library that fits better, if there is one."""

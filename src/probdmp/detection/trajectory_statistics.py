@@ -67,11 +67,11 @@ class Position:
 class Displacement:
     """How an execution has moved lately."""
 
-    offsets = -np.append(LAGS[::-1], 0)
+    offsets = -np.append(0, LAGS[::-1])  # now first: then each difference depends on few points more than the one before
     penalties = (DISPLACEMENT_SHIFTS / SHIFT_STD) ** 2
 
     def __init__(self, model: PathModel) -> None:
-        differences = np.hstack([-np.eye(len(LAGS)), np.ones((len(LAGS), 1))])
+        differences = np.hstack([np.ones((len(LAGS), 1)), -np.eye(len(LAGS))])
         self._dof = model.means.shape[1]
         n_places = TICKS + LAGS.max() + DISPLACEMENT_SHIFTS.max() + 1
         self.windows = PathWindows(model, self.offsets, DISPLACEMENT_SHIFTS, n_places, differences)
@@ -112,8 +112,12 @@ def relative_to_sloppiness(squares: FloatArray) -> FloatArray:
 
 def relative_over_time(squares: FloatArray) -> FloatArray:
     """The same of squared displacements (T, n)."""
-    before = np.zeros((2, *squares.shape))
-    seen = ~np.isnan(squares)
-    for sums, values in zip(before, (np.where(seen, squares, 0.0), seen), strict=True):
-        np.cumsum(values[:-SLOPPINESS_DELAY], axis=0, out=sums[SLOPPINESS_DELAY:])
-    return squares / sloppiness(*before)
+    before = squares[:-SLOPPINESS_DELAY]
+    unseen = np.isnan(before)
+    if unseen.any():
+        totals, counts = np.cumsum(np.where(unseen, 0.0, before), axis=0), np.cumsum(~unseen, axis=0)
+    else:
+        totals, counts = np.cumsum(before, axis=0), np.arange(1, len(before) + 1)[:, None]
+    relative = squares / sloppiness(0.0, 0.0)
+    relative[SLOPPINESS_DELAY:] = squares[SLOPPINESS_DELAY:] / sloppiness(totals, counts)
+    return relative

@@ -5,6 +5,7 @@ That is linear in (1, ahead, window), so one matrix for each place holds all of 
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +13,7 @@ import numpy as np
 from probdmp.checks import FloatArray, IntArray
 from probdmp.gaussian import kernels
 
-__all__ = ["WindowInputs", "WindowMaps", "linear_maps"]
+__all__ = ["Densities", "WindowInputs", "WindowMaps", "linear_maps"]
 
 
 class WindowInputs(NamedTuple):
@@ -48,16 +49,23 @@ class WindowInputs(NamedTuple):
         return rows
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class WindowMaps:
     """The maps of windows of one shape at every place."""
 
     maps: FloatArray
-    """(T, R, A, 1 + D + E) array: R outputs under A shifts, from one, D goals ahead and the E numbers of a window."""
+    """(U, R, 1 + D + E) array: R outputs from one, D goals ahead and the E numbers of a window, for U different windows."""
+    which: IntArray
+    """(T, A) array: which of these each place has under each of A shifts."""
     signals: IntArray
     """(E) which of the signals each number of a window is."""
     reach: IntArray
     """(R) how many inputs, the first ones, an output and those before it depend on."""
+
+    @cached_property
+    def at_places(self) -> FloatArray:
+        """(T, R, A, 1 + D + E) array: the same ready to be multiplied with single windows."""
+        return self.maps[self.which[:, None], np.arange(self.maps.shape[1])[:, None]]
 
     def look(self, place: int, window: FloatArray, starts: IntArray, end: int) -> FloatArray:
         """Squared lengths of the outputs from each of J starts to the next, or the end, of one window: (J, A) array.
@@ -66,8 +74,8 @@ class WindowMaps:
         ----------
         window : one, goals ahead, and as many numbers as the outputs depend on.
         """
-        n_places, n_outputs, n_accounts, n_inputs = self.maps.shape
-        flat = self.maps.reshape(n_places, n_outputs * n_accounts, n_inputs)
+        n_places, n_outputs, n_accounts, n_inputs = self.at_places.shape
+        flat = self.at_places.reshape(n_places, n_outputs * n_accounts, n_inputs)
         white = flat[min(place, n_places - 1), : end * n_accounts, : len(window)].dot(window)
         white *= white
         return np.asarray(np.add.reduceat(white.reshape(end, n_accounts), starts))
@@ -79,11 +87,36 @@ class WindowMaps:
         ----------
         offsets : (E) tick at which each number of a window is seen, relative to the place.
         """
+        shape = (self.which.shape[1], inputs.values.shape[1])
+        found = np.empty(int(wanted.sum()) * shape[0] * shape[1])
+        kernels.whitened_squares(*self._asked(inputs, offsets, ends, wanted), found)
+        return kernels.split_sums(found, wanted, shape)
+
+    def mixtures(
+        self, inputs: WindowInputs, offsets: IntArray, ends: IntArray, wanted: IntArray, densities: "Densities"
+    ) -> list[FloatArray]:
+        """Logarithms of densities of those squares, mixed over the shifts: J arrays (wanted, n); arguments as above."""
+        n = inputs.values.shape[1]
+        found = np.empty(int(wanted.sum()) * n)
+        bases, n_halves, freedom = densities
+        kernels.window_mixtures(*self._asked(inputs, offsets, ends, wanted), bases, n_halves, found, freedom)
+        return kernels.split_sums(found, wanted, (n,))
+
+    def _asked(
+        self, inputs: WindowInputs, offsets: IntArray, ends: IntArray, wanted: IntArray
+    ) -> tuple[FloatArray | IntArray, ...]:
         rows = inputs.rows(int(wanted[0]), offsets, self.signals)
-        n_accounts, n = self.maps.shape[2], inputs.values.shape[1]
-        found = np.empty(int(wanted.sum()) * n_accounts * n)
-        kernels.whitened_squares(inputs.values, rows, self.maps, ends, self.reach, wanted, found)
-        return kernels.split_sums(found, wanted, n_accounts, n)
+        return inputs.values, rows, self.maps, self.which, ends, self.reach, wanted
+
+
+class Densities(NamedTuple):
+    """sum_a (base_a (1 + square_a / freedom))^-(n_halves / 2), a multivariate t with scales of its own for every shift."""
+
+    bases: FloatArray
+    """(T, J, A) array."""
+    n_halves: IntArray
+    """(J)"""
+    freedom: float
 
 
 def linear_maps(whitening: FloatArray, means: FloatArray, gains: FloatArray, signals: IntArray, which: IntArray) -> WindowMaps:
@@ -96,9 +129,7 @@ def linear_maps(whitening: FloatArray, means: FloatArray, gains: FloatArray, sig
     which : (T, A) the window of each place and shift.
     """
     affine = -np.matmul(whitening, np.concatenate([means[..., None], gains], axis=-1))
-    own = np.concatenate([affine, whitening], axis=-1)
-    used = np.asarray(own.any(axis=0))
+    maps = np.concatenate([affine, whitening], axis=-1)
+    used = np.asarray(maps.any(axis=0))
     last = used.shape[1] - np.argmax(used[:, ::-1], axis=1)
-    # (T, R, A, K)
-    maps = own[which[:, None], np.arange(own.shape[1])[:, None]]
-    return WindowMaps(maps, signals, np.maximum.accumulate(last))
+    return WindowMaps(maps, np.ascontiguousarray(which), signals, np.maximum.accumulate(last))

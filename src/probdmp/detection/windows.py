@@ -126,9 +126,9 @@ class PathWindows:
     @property
     def log_determinants(self) -> FloatArray:
         """ln det L^-1 of the points up to each one, of windows of which all was seen: (T, S, P); without a combination."""
-        maps, outputs = self.maps.maps, np.arange(self.maps.maps.shape[1])
-        diagonal = np.log(np.moveaxis(maps[:, outputs, :, outputs - len(outputs)], 0, -1))  # (T, S, P D)
-        return np.asarray(np.cumsum(diagonal.reshape(*diagonal.shape[:2], -1, self._dof).sum(axis=-1), axis=-1))
+        diagonal = np.log(np.diagonal(self.maps.maps[..., -len(self.maps.signals) :], axis1=1, axis2=2))
+        sums = np.cumsum(diagonal.reshape(len(diagonal), -1, self._dof).sum(axis=-1), axis=-1)
+        return np.asarray(sums[self.maps.which])
 
     def squares(self, inputs: WindowInputs, offsets: IntArray, points: IntArray, wanted: IntArray) -> list[FloatArray]:
         """Squared Mahalanobis distances of the first points of windows at the first places, of executions side by side.
@@ -191,7 +191,7 @@ class PathWindows:
         """The contributions in n windows at places (n,), that are (n, P, D) from their means: (n, D) array."""
         compared = np.nan_to_num(self._compared(deviations))
         rows, first = np.minimum(places, len(self._ticks) - 1), -len(self.maps.signals)
-        whitening = self.maps.maps[rows, :, shift, first:]
+        whitening = self.maps.maps[self.maps.which[rows, shift], :, first:]
         if self._combination is not None:
             whitening = np.matmul(whitening, self._unmixed)
         flat = compared.reshape(len(rows), -1, 1)
@@ -200,7 +200,7 @@ class PathWindows:
 
     def _whitening(self, rows: IntArray) -> FloatArray:
         """L^-1 of what is compared at places, (T, S, L D, L D)."""
-        maps = self.maps.maps[rows].swapaxes(1, 2)[..., -len(self.maps.signals) :]
+        maps = self.maps.maps[self.maps.which[rows]][..., -len(self.maps.signals) :]
         return maps if self._combination is None else np.matmul(maps, self._unmixed)
 
     def _residuals(self, rows: IntArray, windows: FloatArray, means: FloatArray) -> FloatArray:

@@ -34,6 +34,8 @@ LARGEST_MAP = 1024
 """Numbers of an execution up to which its log-likelihood is one product with a matrix."""
 BLOCK = 1024
 """Executions that are filtered side by side."""
+PANEL = 64
+"""Rows of the map that are multiplied at once: it is a triangle."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,12 +112,15 @@ class GainSchedule:
     def log_likelihoods(self, readings: FloatArray) -> FloatArray:
         """Of complete readings (N, T, O) less those planned, (N,) array, nats."""
         count, n_numbers = len(readings), self.fused.size
-        squares = np.empty(count)
+        squares, is_whole = np.zeros(count), bool(self.fused.all())
         for first in range(0, count, BLOCK):
             block = readings[first : first + BLOCK]
             if n_numbers <= LARGEST_MAP:
-                white = np.where(self.fused, block, 0.0).reshape(-1, n_numbers) @ self.innovation_map.T
-                squares[first : first + BLOCK] = np.einsum("nk,nk->n", white, white)
+                seen = (block if is_whole else np.where(self.fused, block, 0.0)).reshape(-1, n_numbers)
+                for begin in range(0, n_numbers, PANEL):  # the triangle, but for corners of its steps
+                    end = min(begin + PANEL, n_numbers)
+                    white = seen[:, :end] @ self.innovation_map[begin:end, :end].T
+                    squares[first : first + BLOCK] += np.einsum("nk,nk->n", white, white)
             else:
                 e = np.where(self.fused[:, None], self.innovations(block.swapaxes(0, 1)), 0.0)
                 squares[first : first + BLOCK] = np.einsum("tno,top,tnp->n", e, self.precisions, e, optimize=True)

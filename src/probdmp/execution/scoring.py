@@ -58,7 +58,8 @@ def score_batch(primitive: Primitive, batch: ExecutionBatch, sensors: SensorArra
     if score is not None:
         for members in _alike(batch):
             if len(members) >= FEW:
-                scores[members] = score(primitive, batch.take(members), array)
+                own = batch if len(members) == len(batch) else batch.take(members)
+                scores[members] = score(primitive, own, array)
     rest = np.flatnonzero(np.isnan(scores))
     if len(rest):
         scores[rest] = _score_singly(primitive, batch.take(rest), array)
@@ -71,6 +72,9 @@ def _alike(batch: ExecutionBatch) -> Iterator[IntArray]:
     task = batch.tasks
     told = [np.isnan(part) for part in (task.start, task.goal, task.start_velocity) if part is not None]
     keys = np.column_stack([task.duration, *told])[complete]
+    if len(keys) and np.all(keys == keys[0]):
+        yield complete
+        return
     _, kinds = np.unique(keys, axis=0, return_inverse=True)
     for kind in range(int(kinds.max(initial=-1)) + 1):
         yield complete[kinds == kind]

@@ -24,6 +24,7 @@
 #endif
 
 #define MOST_STATES 4
+#define OUTPUTS 4 /* rows of maps that are multiplied with a window at once */
 #define TILE 512 /* observations of each that are brought side by side at a time */
 #define LARGEST_MAGNITUDE 1e100 /* see checks.py */
 #define LOG_2PI 1.8378770664093453
@@ -140,11 +141,16 @@ typedef struct {
     const double *closed, *feedback, *sensor, *precisions, *observed, *paths;
 } Series;
 
-/* Windows of n executions, each after linear maps of its own place. */
+/* Windows of n executions, each after the linear maps of its own place, one for each account of it. */
 typedef struct {
-    Py_ssize_t n, n_values, n_places, n_inputs, n_maps, n_outputs, n_accounts, n_sums;
+    Py_ssize_t n, n_values, n_places, n_inputs, n_maps, n_outputs, n_mapped, n_accounts, n_sums;
     const double *values, *maps;
-    const int64_t *rows, *ends, *reach, *wanted;
+    const int64_t *rows, *which, *ends, *reach, *wanted;
+    const double *scales; /* of mixtures; none where squares are asked for */
+    const int64_t *n_halves;
+    double inverse;
+    int64_t *extents; /* to work in: so are the following */
+    double *packed, *window, *sums;
 } Windows;
 
 /* ---- Loops, for any processor and for AVX2 ------------------------------------------------------------------------------ */
@@ -160,6 +166,9 @@ typedef struct {
 #define step_lane NAMED(step_lane)
 #define store NAMED(store)
 #define times NAMED(times)
+#define plus_number NAMED(plus_number)
+#define smaller NAMED(smaller)
+#define logarithm NAMED(logarithm)
 #define plus NAMED(plus)
 #define bring_together NAMED(bring_together)
 #define innovation_of NAMED(innovation_of)
@@ -171,10 +180,11 @@ typedef struct {
 #define score_all NAMED(score_all)
 #define smooth_all NAMED(smooth_all)
 
+#define pack NAMED(pack)
 #define square_outputs NAMED(square_outputs)
-#define look_at_windows NAMED(look_at_windows)
 #define mix_lane NAMED(mix_lane)
-#define mix_all NAMED(mix_all)
+#define look_at_lane NAMED(look_at_lane)
+#define look_at_windows NAMED(look_at_windows)
 
 #define NAMED(name) name##_anywhere
 #include "_kernels.c"
@@ -196,7 +206,6 @@ static void look_at_processor(void) {}
 #endif
 #undef filter_all
 #undef look_at_windows
-#undef mix_all
 #undef step_all
 #undef score_all
 #undef smooth_all
@@ -343,81 +352,92 @@ static PyObject *smoothed_states(PyObject *module, PyObject *const *arguments, P
 
 /* ---- Windows ------------------------------------------------------------------------------------------------------------ */
 
-static int windows_fit(const Array *x, Windows *s)
+#define WINDOWS {"values", 0, 2, 0}, {"rows", 0, 2, 1}, {"maps", 0, 3, 0}, {"which", 0, 2, 1}, {"ends", 0, 1, 1}, \
+                {"reach", 0, 1, 1}, {"wanted", 0, 1, 1}
+
+static int windows_fit(const Array *x, const Array *found, int per_account, Windows *s)
 {
-    *s = (Windows){x[0].view.shape[1], x[0].view.shape[0], x[1].view.shape[0], x[1].view.shape[1], x[2].view.shape[0],
-                   x[2].view.shape[1], x[2].view.shape[2], x[3].view.shape[0], x[0].data, x[2].data,
-                   x[1].integers, x[3].integers, x[4].integers, x[5].integers};
-    if (!agree(&x[2], "maps", s->n_maps, s->n_outputs, s->n_accounts, s->n_inputs) || !agree(&x[4], "reach", s->n_outputs, 0, 0, 0)
-        || !agree(&x[5], "wanted", s->n_sums, 0, 0, 0))
+    *s = (Windows){
+        .n = x[0].view.shape[1], .n_values = x[0].view.shape[0], .n_places = x[1].view.shape[0], .n_inputs = x[1].view.shape[1],
+        .n_maps = x[2].view.shape[0], .n_outputs = x[2].view.shape[1], .n_mapped = x[3].view.shape[0],
+        .n_accounts = x[3].view.shape[1], .n_sums = x[4].view.shape[0], .values = x[0].data, .maps = x[2].data,
+        .rows = x[1].integers, .which = x[3].integers, .ends = x[4].integers, .reach = x[5].integers, .wanted = x[6].integers,
+    };
+    if (!agree(&x[2], "maps", s->n_maps, s->n_outputs, s->n_inputs, 0) || !agree(&x[5], "reach", s->n_outputs, 0, 0, 0)
+        || !agree(&x[6], "wanted", s->n_sums, 0, 0, 0))
         return 0;
-    int is_sound = s->n_sums > 0 && s->n_maps > 0 && s->n_inputs > 0 && s->n_accounts > 0;
+    int is_sound = s->n_sums > 0 && s->n_mapped > 0 && s->n_inputs > 0 && s->n_accounts > 0;
     Py_ssize_t size = 0;
     for (Py_ssize_t j = 0; is_sound && j < s->n_sums; j++) {
         is_sound = s->ends[j] > (j ? s->ends[j - 1] : 0) && s->ends[j] <= s->n_outputs && s->wanted[j] >= 0
                    && s->wanted[j] <= (j ? s->wanted[j - 1] : s->n_places);
-        size += s->wanted[j] * s->n_accounts * s->n;
+        size += s->wanted[j] * (per_account ? s->n_accounts : 1) * s->n;
     }
-    for (Py_ssize_t i = 0; is_sound && i < s->n_outputs; i++) is_sound = s->reach[i] >= 0 && s->reach[i] <= s->n_inputs;
+    for (Py_ssize_t i = 0; is_sound && i < s->n_outputs; i++)
+        is_sound = s->reach[i] >= (i ? s->reach[i - 1] : 0) && s->reach[i] <= s->n_inputs;
     for (Py_ssize_t i = 0; is_sound && i < s->n_places * s->n_inputs; i++) is_sound = s->rows[i] >= 0 && s->rows[i] < s->n_values;
-    if (!is_sound || x[6].view.shape[0] != size) {
-        PyErr_SetString(PyExc_ValueError, "rows, ends, reach, wanted and found do not belong together");
+    for (Py_ssize_t i = 0; is_sound && i < s->n_mapped * s->n_accounts; i++)
+        is_sound = s->which[i] >= 0 && s->which[i] < s->n_maps;
+    if (!is_sound || found->view.shape[0] != size) {
+        PyErr_SetString(PyExc_ValueError, "rows, maps, which, ends, reach, wanted and found do not belong together");
         return 0;
     }
     return 1;
 }
 
+/* Looks at windows that fit; 0 without memory. */
+static int look(Windows *s, double *found)
+{
+    const Py_ssize_t groups = s->n_outputs * s->n_accounts / OUTPUTS + s->n_sums, k = s->n_inputs;
+    double *work = malloc((groups * OUTPUTS * k + (k + s->n_accounts + 1) * WIDTH) * sizeof(double));
+    s->extents = malloc(groups * sizeof(int64_t));
+    const int has_memory = work != NULL && s->extents != NULL;
+    if (has_memory) {
+        s->window = work + (-(uintptr_t)work / sizeof(double)) % WIDTH; /* where a lane begins with a line of the cache */
+        s->sums = s->window + k * WIDTH;
+        s->packed = s->sums + s->n_accounts * WIDTH;
+        Py_BEGIN_ALLOW_THREADS
+        CHOOSE(look_at_windows)(s, found);
+        Py_END_ALLOW_THREADS
+    } else
+        PyErr_NoMemory();
+    free(s->extents);
+    free(work);
+    return has_memory;
+}
+
 static PyObject *whitened_squares(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
 {
-    static const Spec specs[] = {
-        {"values", 0, 2, 0}, {"rows", 0, 2, 1}, {"maps", 0, 4, 0}, {"ends", 0, 1, 1}, {"reach", 0, 1, 1}, {"wanted", 0, 1, 1},
-        {"found", 1, 1, 0},
-    };
+    static const Spec specs[] = {WINDOWS, {"found", 1, 1, 0}};
     enum { COUNT = sizeof(specs) / sizeof(specs[0]) };
     Array x[COUNT];
     Windows s;
     if (take(arguments, given, specs, COUNT, x) < 0) return NULL;
-    int done = windows_fit(x, &s);
-    if (done) {
-        double *work = malloc((s.n_inputs + s.n_accounts) * WIDTH * sizeof(double));
-        done = work != NULL;
-        if (done) {
-            Py_BEGIN_ALLOW_THREADS
-            CHOOSE(look_at_windows)(&s, work, work + s.n_inputs * WIDTH, x[6].data);
-            Py_END_ALLOW_THREADS
-        } else
-            PyErr_NoMemory();
-        free(work);
-    }
+    const int done = windows_fit(x, &x[COUNT - 1], 1, &s) && look(&s, x[COUNT - 1].data);
     release(x, COUNT);
     if (!done) return NULL;
     Py_RETURN_NONE;
 }
 
-static PyObject *log_mixtures(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
+static PyObject *window_mixtures(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
 {
-    static const Spec specs[] = {{"squares", 0, 3, 0}, {"scales", 0, 2, 0}, {"mixed", 1, 2, 0}};
+    static const Spec specs[] = {WINDOWS, {"scales", 0, 3, 0}, {"n_halves", 0, 1, 1}, {"found", 1, 1, 0}};
     enum { COUNT = sizeof(specs) / sizeof(specs[0]) };
     Array x[COUNT];
-    if (given != COUNT + 2) {
-        PyErr_Format(PyExc_TypeError, "expected %d arrays and two numbers, got %zd arguments", COUNT, given);
+    Windows s;
+    if (given != COUNT + 1) {
+        PyErr_Format(PyExc_TypeError, "expected %d arrays and a number, got %zd arguments", COUNT, given);
         return NULL;
     }
-    const Py_ssize_t n_halves = PyLong_AsSsize_t(arguments[COUNT]);
-    const double freedom = PyFloat_AsDouble(arguments[COUNT + 1]);
+    const double freedom = PyFloat_AsDouble(arguments[COUNT]);
     if (PyErr_Occurred() || take(arguments, COUNT, specs, COUNT, x) < 0) return NULL;
-    const Py_ssize_t g = x[0].view.shape[0], a = x[0].view.shape[1], n = x[0].view.shape[2];
-    int done = agree(&x[1], "scales", g, a, 0, 0) && agree(&x[2], "mixed", g, n, 0, 0);
+    int done = windows_fit(x, &x[COUNT - 1], 0, &s);
+    done = done && agree(&x[7], "scales", s.n_mapped, s.n_sums, s.n_accounts, 0) && agree(&x[8], "n_halves", s.n_sums, 0, 0, 0);
     if (done) {
-        double *padded = malloc((a ? a : 1) * WIDTH * sizeof(double));
-        done = padded != NULL;
-        if (done) {
-            Py_BEGIN_ALLOW_THREADS
-            CHOOSE(mix_all)(x[0].data, g, a, n, x[1].data, n_halves, 1 / freedom, padded, x[2].data);
-            Py_END_ALLOW_THREADS
-        } else
-            PyErr_NoMemory();
-        free(padded);
+        s.scales = x[7].data;
+        s.n_halves = x[8].integers;
+        s.inverse = 1 / freedom;
+        done = look(&s, x[COUNT - 1].data);
     }
     release(x, COUNT);
     if (!done) return NULL;
@@ -430,7 +450,7 @@ static PyObject *log_mixtures(PyObject *module, PyObject *const *arguments, Py_s
 
 static PyMethodDef functions[] = {
     FUNCTION(filter_systems), FUNCTION(filter_step), FUNCTION(squared_innovations), FUNCTION(smoothed_states),
-    FUNCTION(whitened_squares), FUNCTION(log_mixtures),
+    FUNCTION(whitened_squares), FUNCTION(window_mixtures),
     {NULL, NULL, 0, NULL},
 };
 
@@ -575,6 +595,51 @@ INLINE Lane plus_product(Lane sum, Lane x, Lane y)
 {
     UNROLL for (int i = 0; i < PARTS; i++) sum.part[i] += x.part[i] * y.part[i];
     return sum;
+}
+
+INLINE Lane plus_number(Lane x, double number)
+{
+    UNROLL for (int i = 0; i < PARTS; i++) x.part[i] = x.part[i] + number;
+    return x;
+}
+
+INLINE Lane smaller(Lane x, Lane y)
+{
+#ifdef MASK
+    UNROLL for (int i = 0; i < PARTS; i++) {
+        const MASK is_less = x.part[i] < y.part[i];
+        x.part[i] = (Vector)((is_less & (MASK)x.part[i]) | (~is_less & (MASK)y.part[i]));
+    }
+#else
+    for (int i = 0; i < PARTS; i++) x.part[i] = x.part[i] < y.part[i] ? x.part[i] : y.part[i];
+#endif
+    return x;
+}
+
+/* ln x of normal positive numbers, to an ulp: x = 2^k (1 + f), s = f / (2 + f), ln (1 + f) = 2 atanh s by its minimax polynomial.
+   Source: e_log.c of FreeBSD's msun, (c) 1993 Sun Microsystems, free to use. Other numbers are left to the C library. */
+INLINE Lane logarithm(Lane x)
+{
+#ifdef MASK
+    MASK is_normal = {-1, -1, -1, -1};
+    Lane y;
+    UNROLL for (int i = 0; i < PARTS; i++) {
+        const MASK bits = (MASK)x.part[i], above = ((bits & 0xfffffffffffff) > 0x6a09e667f3bcd) & 1; /* sqrt 2 */
+        const MASK exponent = (bits >> 52) - 1023 + above, mantissa = (bits & 0xfffffffffffff) | ((1023 - above) << 52);
+        const Vector k = (Vector)(exponent + 0x4338000000000000) - 0x1.8p52; /* as numbers: there is no instruction */
+        const Vector f = (Vector)mantissa - 1.0, s = f / (2.0 + f), z = s * s, w = z * z, half = 0.5 * f * f;
+        const Vector even = w * (3.999999999940941908e-01 + w * (2.222219843214978396e-01 + w * 1.531383769920937332e-01));
+        const Vector odd = z * (6.666666666666735130e-01 + w * (2.857142874366239149e-01
+                                + w * (1.818357216161805012e-01 + w * 1.479819860511658591e-01)));
+        y.part[i] = k * 6.93147180369123816490e-01 - ((half - (s * (half + even + odd) + k * 1.90821492927058770002e-10)) - f);
+        is_normal &= (bits >= 0x0010000000000000) & (bits < 0x7ff0000000000000);
+    }
+    if (is_normal[0] & is_normal[1] & is_normal[2] & is_normal[3]) return y;
+#endif
+    double numbers[WIDTH];
+    store(numbers, x);
+    for (int w = 0; w < WIDTH; w++) numbers[w] = log(numbers[w]);
+    return load(numbers);
 }
 
 /* x, but 0 where e is NaN */
@@ -824,114 +889,110 @@ static void smooth_all(int n, const Series *s, const double *predicted, const do
 
 /* ---- Windows ------------------------------------------------------------------------------------------------------------ */
 
-#define OUTPUTS 4 /* rows of a map that are multiplied with a window at once */
-
-/* Adds the squares of outputs `begin` to `end` of a map, which are A for each of its rows, to the sums of the A accounts. */
-INLINE void square_outputs(const Windows *s, const double *map, Py_ssize_t begin, Py_ssize_t end, const double *window,
-                           double *sums)
+/* Rows of the maps of a place in the order in which they are multiplied: those that each sum adds, by output and account, OUTPUTS
+   at a time, column by column as far as they reach. They stay in the cache for all executions. */
+INLINE void pack(const Windows *s, const int64_t *which)
 {
-    const Py_ssize_t k = s->n_inputs;
-    Py_ssize_t i = begin;
-    while (i < end) {
-        const int at_once = end - i >= OUTPUTS ? OUTPUTS : 1;
-        const Py_ssize_t used = s->reach[(i + at_once - 1) / s->n_accounts];
-        const double *row = map + i * k;
-        const Lane zero = times(0.0, load(window));
-        if (at_once == OUTPUTS) {
-            Lane a = zero, b = zero, c = zero, d = zero;
-            for (Py_ssize_t j = 0; j < used; j++) {
-                const Lane x = load(window + j * WIDTH);
-                a = plus(a, row[j], x);
-                b = plus(b, row[k + j], x);
-                c = plus(c, row[2 * k + j], x);
-                d = plus(d, row[3 * k + j], x);
+    const Py_ssize_t a = s->n_accounts, k = s->n_inputs;
+    double *to = s->packed;
+    int64_t *extent = s->extents;
+    Py_ssize_t begin = 0;
+    for (Py_ssize_t j = 0; j < s->n_sums; j++) {
+        const Py_ssize_t end = s->ends[j] * a;
+        for (Py_ssize_t i = begin; i < end; i += OUTPUTS) {
+            const Py_ssize_t last = i + OUTPUTS < end ? i + OUTPUTS - 1 : end - 1, used = s->reach[last / a];
+            for (int o = 0; o < OUTPUTS; o++) {
+                const Py_ssize_t at = i + o < end ? i + o : i;
+                const double *row = s->maps + (which[at % a] * s->n_outputs + at / a) * k;
+                for (Py_ssize_t c = 0; c < used; c++) to[c * OUTPUTS + o] = i + o < end ? row[c] : 0;
             }
-            double *of[OUTPUTS];
-            for (int o = 0; o < OUTPUTS; o++) of[o] = sums + (i + o) % s->n_accounts * WIDTH;
-            store(of[0], plus_product(load(of[0]), a, a));
-            store(of[1], plus_product(load(of[1]), b, b));
-            store(of[2], plus_product(load(of[2]), c, c));
-            store(of[3], plus_product(load(of[3]), d, d));
-        } else {
-            Lane a = zero;
-            for (Py_ssize_t j = 0; j < used; j++) a = plus(a, row[j], load(window + j * WIDTH));
-            double *of = sums + i % s->n_accounts * WIDTH;
-            store(of, plus_product(load(of), a, a));
+            to += used * OUTPUTS;
+            *extent++ = used;
         }
-        i += at_once;
+        begin = end;
     }
 }
 
-/* Sums of squares up to each end, one array (wanted, A, n) after the other. The maps of a place stay in the cache meanwhile. */
-static void look_at_windows(const Windows *s, double *window, double *sums, double *found)
+/* Adds the squares of some groups of outputs of a window to the sums of the accounts. */
+INLINE const double *square_outputs(const Windows *s, const double *packed, const int64_t *extents, Py_ssize_t n_groups)
 {
-    const Py_ssize_t a = s->n_accounts, n = s->n;
-    for (Py_ssize_t place = 0; place < s->wanted[0]; place++) {
-        const double *map = s->maps + (place < s->n_maps ? place : s->n_maps - 1) * s->n_outputs * a * s->n_inputs;
-        const int64_t *rows = s->rows + place * s->n_inputs;
-        for (Py_ssize_t first = 0; first < n; first += WIDTH) {
-            const Py_ssize_t width = n - first < WIDTH ? n - first : WIDTH;
-            for (Py_ssize_t k = 0; k < s->n_inputs; k++) {
-                const double *from = s->values + rows[k] * n + first;
-                if (width == WIDTH)
-                    store(window + k * WIDTH, load(from));
-                else
-                    for (int w = 0; w < WIDTH; w++) window[k * WIDTH + w] = w < width ? from[w] : 0;
-            }
-            memset(sums, 0, a * WIDTH * sizeof(double));
-            double *to = found;
-            Py_ssize_t begin = 0;
-            for (Py_ssize_t j = 0; j < s->n_sums && place < s->wanted[j]; j++) {
-                square_outputs(s, map, begin * a, s->ends[j] * a, window, sums);
-                begin = s->ends[j];
-                for (Py_ssize_t i = 0; i < a; i++)
-                    memcpy(to + (place * a + i) * n + first, sums + i * WIDTH, width * sizeof(double));
-                to += s->wanted[j] * a * n;
-            }
+    Py_ssize_t account = 0;
+    for (Py_ssize_t g = 0; g < n_groups; g++) {
+        const Lane zero = times(0.0, load(s->window));
+        Lane sum[OUTPUTS] = {zero, zero, zero, zero};
+        for (Py_ssize_t c = 0; c < extents[g]; c++, packed += OUTPUTS) {
+            const Lane x = load(s->window + c * WIDTH);
+            UNROLL for (int o = 0; o < OUTPUTS; o++) sum[o] = plus(sum[o], packed[o], x);
+        }
+        UNROLL for (int o = 0; o < OUTPUTS; o++) {
+            double *of = s->sums + account * WIDTH;
+            store(of, plus_product(load(of), sum[o], sum[o]));
+            account = account + 1 < s->n_accounts ? account + 1 : 0;
         }
     }
+    return packed;
 }
 
-/* ln sum_a (scale_a (1 + square_a / freedom))^-(n_halves / 2) of WIDTH executions, squares n apart; powers by squaring. */
-INLINE void mix_lane(const double *squares, Py_ssize_t n, const double *scales, Py_ssize_t n_accounts, Py_ssize_t n_halves,
-                     double inverse, double *mixed)
+/* ln sum_a (scale_a (1 + square_a / freedom))^-(n_halves / 2); powers by squaring. */
+INLINE Lane mix_lane(const Windows *s, const double *scales, Py_ssize_t n_halves)
 {
-    double least[WIDTH], total[WIDTH] = {0}, base[WIDTH], power[WIDTH];
-    for (int w = 0; w < WIDTH; w++) least[w] = INFINITY;
-    for (Py_ssize_t a = 0; a < n_accounts; a++)
-        for (int w = 0; w < WIDTH; w++) {
-            const double b = scales[a] + scales[a] * inverse * squares[a * n + w];
-            least[w] = b < least[w] ? b : least[w];
+    const Lane zero = times(0.0, load(s->window)), one = plus_number(zero, 1.0);
+    Lane least = plus_number(zero, INFINITY), total = zero;
+    for (Py_ssize_t a = 0; a < s->n_accounts; a++)
+        least = smaller(plus_number(times(scales[a] * s->inverse, load(s->sums + a * WIDTH)), scales[a]), least);
+    for (Py_ssize_t a = 0; a < s->n_accounts; a++) {
+        const Lane own = plus_number(times(scales[a] * s->inverse, load(s->sums + a * WIDTH)), scales[a]);
+        Lane base = quotient(least, own), power = one;
+        if (n_halves % 2) {
+            double roots[WIDTH];
+            store(roots, base);
+            for (int w = 0; w < WIDTH; w++) roots[w] = sqrt(roots[w]);
+            power = load(roots);
         }
-    for (Py_ssize_t a = 0; a < n_accounts; a++) {
-        for (int w = 0; w < WIDTH; w++) base[w] = least[w] / (scales[a] + scales[a] * inverse * squares[a * n + w]);
-        for (int w = 0; w < WIDTH; w++) power[w] = n_halves % 2 ? sqrt(base[w]) : 1;
         for (Py_ssize_t e = n_halves / 2; e; e /= 2) {
-            if (e % 2)
-                for (int w = 0; w < WIDTH; w++) power[w] *= base[w];
-            for (int w = 0; w < WIDTH; w++) base[w] *= base[w];
+            if (e % 2) power = plus_product(zero, power, base);
+            base = plus_product(zero, base, base);
         }
-        for (int w = 0; w < WIDTH; w++) total[w] += power[w];
+        total = plus_product(total, one, power);
     }
-    for (int w = 0; w < WIDTH; w++) mixed[w] = log(total[w]) - n_halves / 2.0 * log(least[w]);
+    return plus(logarithm(total), -n_halves / 2.0, logarithm(least));
 }
 
-static void mix_all(const double *squares, Py_ssize_t n_places, Py_ssize_t n_accounts, Py_ssize_t n, const double *scales,
-                    Py_ssize_t n_halves, double inverse, double *padded, double *mixed)
+/* What is asked about one place of some executions; arrays (wanted, A, n) of sums up to each end, or (wanted, n) of mixtures. */
+INLINE void look_at_lane(const Windows *s, Py_ssize_t place, Py_ssize_t mapped, Py_ssize_t first, Py_ssize_t width, double *found)
 {
-    double some[WIDTH];
-    for (Py_ssize_t g = 0; g < n_places; g++) {
-        const double *own = squares + g * n_accounts * n, *scale = scales + g * n_accounts;
-        for (Py_ssize_t first = 0; first < n; first += WIDTH) {
-            if (n - first >= WIDTH) {
-                mix_lane(own + first, n, scale, n_accounts, n_halves, inverse, mixed + g * n + first);
-                continue;
-            }
-            for (Py_ssize_t a = 0; a < n_accounts; a++)
-                for (int w = 0; w < WIDTH; w++) padded[a * WIDTH + w] = w < n - first ? own[a * n + first + w] : 0;
-            mix_lane(padded, WIDTH, scale, n_accounts, n_halves, inverse, some);
-            memcpy(mixed + g * n + first, some, (n - first) * sizeof(double));
-        }
+    const Py_ssize_t a = s->n_accounts, n = s->n, columns = s->scales ? 1 : a;
+    const double *packed = s->packed;
+    const int64_t *extents = s->extents, *rows = s->rows + place * s->n_inputs;
+    for (Py_ssize_t k = 0; k < s->n_inputs; k++) {
+        const double *from = s->values + rows[k] * n + first;
+        if (width == WIDTH)
+            store(s->window + k * WIDTH, load(from));
+        else
+            for (int w = 0; w < WIDTH; w++) s->window[k * WIDTH + w] = w < width ? from[w] : 0;
+    }
+    memset(s->sums, 0, a * WIDTH * sizeof(double));
+    Py_ssize_t begin = 0;
+    for (Py_ssize_t j = 0; j < s->n_sums && place < s->wanted[j]; j++) {
+        const Py_ssize_t n_groups = ((s->ends[j] - begin) * a + OUTPUTS - 1) / OUTPUTS;
+        packed = square_outputs(s, packed, extents, n_groups);
+        extents += n_groups;
+        begin = s->ends[j];
+        double mixed[WIDTH];
+        if (s->scales) store(mixed, mix_lane(s, s->scales + (mapped * s->n_sums + j) * a, s->n_halves[j]));
+        for (Py_ssize_t i = 0; i < columns; i++)
+            memcpy(found + (place * columns + i) * n + first, s->scales ? mixed : s->sums + i * WIDTH, width * sizeof(double));
+        found += s->wanted[j] * columns * n;
+    }
+}
+
+static void look_at_windows(const Windows *s, double *found)
+{
+    for (Py_ssize_t place = 0; place < s->wanted[0]; place++) {
+        const Py_ssize_t mapped = place < s->n_mapped ? place : s->n_mapped - 1;
+        pack(s, s->which + mapped * s->n_accounts);
+        for (Py_ssize_t first = 0; first < s->n; first += WIDTH)
+            look_at_lane(s, place, mapped, first, s->n - first < WIDTH ? s->n - first : WIDTH, found);
     }
 }
 

@@ -5,6 +5,8 @@
 All arrays are float64 and C-contiguous; the last arguments are written to. NaN marks what was not observed.
 """
 
+import math
+
 import numpy as np
 
 from probdmp.checks import LARGEST_MAGNITUDE, FloatArray, IntArray
@@ -12,11 +14,11 @@ from probdmp.checks import LARGEST_MAGNITUDE, FloatArray, IntArray
 __all__ = [
     "filter_step",
     "filter_systems",
-    "log_mixtures",
     "smoothed_states",
     "split_sums",
     "squared_innovations",
     "whitened_squares",
+    "window_mixtures",
 ]
 
 LOG_2PI = float(np.log(2 * np.pi))
@@ -169,59 +171,85 @@ def whitened_squares(
     values: FloatArray,
     rows: IntArray,
     maps: FloatArray,
+    which: IntArray,
     ends: IntArray,
     reach: IntArray,
     wanted: IntArray,
     found: FloatArray,
 ) -> None:
-    """Squared length of windows after a linear map, summed up to several of its outputs.
+    """Squared length of windows after linear maps, summed up to several of their outputs.
 
     Parameters
     ----------
     values : (M, n) array: all numbers that may be in a window, of each execution.
     rows : (G, K) which of them make up the window at each of G places.
-    maps : (P, R, A, K) array: R outputs of each place under A accounts of it; a place beyond the last has its map.
+    maps : (U, R, K) array: R outputs of a window.
+    which : (P, A) the maps of each place, for A accounts of it; a place beyond the last has those of the last.
     ends : (J) increasing; sums run over outputs 0, 1, ..., end - 1.
-    reach : (R) an output, and those before it, depend on so many inputs, the first ones of a window.
+    reach : (R) how many inputs, the first ones of a window, an output depends on; not decreasing.
     wanted : (J) at how many places, the first ones, each of the sums is asked for; not increasing.
     found : written: J arrays (wanted, A, n), one after the other.
     """
-    n, (n_accounts, n_inputs) = values.shape[1], maps.shape[2:]
-    sums = split_sums(found, wanted, n_accounts, n)
+    n, n_accounts = values.shape[1], which.shape[1]
+    sums = split_sums(found, wanted, (n_accounts, n))
     if n <= FEW:
-        _look_at_all_places(values, rows, maps, ends, sums)
+        _look_at_all_places(values, rows, maps, which, ends, sums)
         return
-    window = np.empty((n_inputs, n))
+    window = np.empty((maps.shape[2], n))
     outputs = np.empty((int(np.diff(ends, prepend=0).max()) * n_accounts, n))
     for place in range(int(wanted[0])):
         np.take(values, rows[place], axis=0, out=window, mode="clip")
-        at_place, begin = maps[min(place, len(maps) - 1)].reshape(-1, n_inputs), 0
+        at_place, begin = maps[which[min(place, len(which) - 1)]], 0
         for j, (end, used) in enumerate(zip(ends, reach[ends - 1], strict=True)):
             if place >= wanted[j]:
                 break
             white = outputs[: (end - begin) * n_accounts]
-            np.matmul(at_place[begin * n_accounts : end * n_accounts, :used], window[:used], out=white)
+            np.matmul(at_place[:, begin:end, :used].reshape(len(white), used), window[:used], out=white)
             np.multiply(white, white, out=white)
-            np.add.reduce(white.reshape(end - begin, n_accounts, n), axis=0, out=sums[j][place])
+            np.add.reduce(white.reshape(n_accounts, end - begin, n), axis=1, out=sums[j][place])
             if j:
                 sums[j][place] += sums[j - 1][place]
             begin = end
 
 
-def split_sums(found: FloatArray, wanted: IntArray, n_accounts: int, n: int) -> list[FloatArray]:
-    """The J arrays (wanted, A, n) that `whitened_squares` writes one after the other."""
-    parts = np.split(found, np.cumsum(wanted * n_accounts * n)[:-1])
-    return [part.reshape(count, n_accounts, n) for part, count in zip(parts, wanted, strict=True)]
-
-
-def log_mixtures(squares: FloatArray, scales: FloatArray, mixed: FloatArray, n_halves: int, freedom: float) -> None:
-    """ln sum_a (scale_a (1 + square_a / freedom))^-(n_halves / 2).
+def window_mixtures(
+    values: FloatArray,
+    rows: IntArray,
+    maps: FloatArray,
+    which: IntArray,
+    ends: IntArray,
+    reach: IntArray,
+    wanted: IntArray,
+    scales: FloatArray,
+    n_halves: IntArray,
+    found: FloatArray,
+    freedom: float,
+) -> None:
+    """ln sum_a (scale_a (1 + square_a / freedom))^-(n_halves / 2) of such sums of squares, over the accounts.
 
     Parameters
     ----------
-    squares, scales : (G, A, n) and (G, A) arrays.
-    mixed : written, (G, n).
+    scales : (P, J, A) array, of each place and sum.
+    n_halves : (J)
+    found : written: J arrays (wanted, n), one after the other.
     """
+    n, n_accounts = values.shape[1], which.shape[1]
+    squares = np.empty(int(wanted.sum()) * n_accounts * n)
+    whitened_squares(values, rows, maps, which, ends, reach, wanted, squares)
+    mixtures = split_sums(found, wanted, (n,))
+    for j, (some, mixed) in enumerate(zip(split_sums(squares, wanted, (n_accounts, n)), mixtures, strict=True)):
+        own = scales[np.minimum(np.arange(len(some)), len(scales) - 1), j]
+        _mix(some, own, mixed, int(n_halves[j]), freedom)
+
+
+def split_sums(found: FloatArray, wanted: IntArray, shape: tuple[int, ...]) -> list[FloatArray]:
+    """The J arrays (wanted, *shape) that are written one after the other."""
+    parts = np.split(found, np.cumsum(wanted * math.prod(shape))[:-1])
+    return [part.reshape(count, *shape) for part, count in zip(parts, wanted, strict=True)]
+
+
+def _mix(squares: FloatArray, scales: FloatArray, mixed: FloatArray, n_halves: int, freedom: float) -> None:
+    """Mixtures (G, n) of squares (G, A, n) with scales (G, A)."""
     # A few places at a time, which stay close to the processor.
     step = max(1, 16384 // max(squares[0].size, 1)) if len(squares) else 1
     for begin in range(0, len(squares), step):
@@ -246,16 +274,17 @@ def _power(base: FloatArray, n_halves: int) -> FloatArray:
     return np.ones_like(base) if power is None else power
 
 
-def _look_at_all_places(values: FloatArray, rows: IntArray, maps: FloatArray, ends: IntArray, found: list[FloatArray]) -> None:
-    count, (n_accounts, n_inputs) = len(found[0]), maps.shape[2:]
-    at = maps[:count] if count <= len(maps) else maps[np.minimum(np.arange(count), len(maps) - 1)]
-    at = at[:, : ends[-1]].reshape(count, -1, n_inputs)
-    white = np.matmul(at, values[rows[:count]])
+def _look_at_all_places(
+    values: FloatArray, rows: IntArray, maps: FloatArray, which: IntArray, ends: IntArray, found: list[FloatArray]
+) -> None:
+    count, n_accounts, end = len(found[0]), which.shape[1], int(ends[-1])
+    at = maps[which[np.minimum(np.arange(count), len(which) - 1)], :end]
+    white = np.matmul(at.reshape(count, n_accounts * end, maps.shape[2]), values[rows[:count]])
     np.multiply(white, white, out=white)
-    sums = np.add.reduceat(white.reshape(count, ends[-1], n_accounts, -1), [0, *ends[:-1]], axis=1)
-    np.cumsum(sums, axis=1, out=sums)
+    sums = np.add.reduceat(white.reshape(count, n_accounts, end, values.shape[1]), [0, *ends[:-1]], axis=2)
+    np.cumsum(sums, axis=2, out=sums)
     for j, own in enumerate(found):
-        own[:] = sums[: len(own), j]
+        own[:] = sums[: len(own), :, j]
 
 
 def _blocks(observations: FloatArray, paths: FloatArray) -> "list[tuple[slice, FloatArray]]":

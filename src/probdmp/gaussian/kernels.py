@@ -18,11 +18,11 @@ __all__ = [
     "filter_step",
     "filter_systems",
     "in_threads",
-    "log_mixtures",
     "smoothed_states",
     "split_sums",
     "squared_innovations",
     "whitened_squares",
+    "window_mixtures",
 ]
 
 
@@ -53,7 +53,7 @@ filter_step: Callable[..., int] = _kernels.filter_step
 squared_innovations: Callable[..., None] = _kernels.squared_innovations
 smoothed_states: Callable[..., None] = _kernels.smoothed_states
 whitened_squares: Callable[..., None] = _kernels.whitened_squares
-log_mixtures: Callable[..., None] = _kernels.log_mixtures
+window_mixtures: Callable[..., None] = _kernels.window_mixtures
 split_sums = _kernels_numpy.split_sums
 
 
