@@ -84,7 +84,7 @@ def test_one_product_or_one_recursion_is_the_same(seed):
     batch = random_batch(rng, primitive, array, 16, 0.0)
     by_product = score_batch(primitive, batch, array)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("probdmp.execution.gain_schedule.LARGEST_MAP", 0)
+        patch.setattr("probdmp.execution.scoring.LARGEST_GAUSSIAN", 0)
         np.testing.assert_allclose(score_batch(primitive, batch, array), by_product, rtol=1e-9, atol=1e-9)
 
 

@@ -9,10 +9,8 @@ them d', and of the latent z',
     (x', d', z') <- (x', d', z') + K[t] e[t],    then d' <- A d'
 """
 
-from collections import OrderedDict
+from collections.abc import Hashable
 from dataclasses import dataclass
-from functools import cached_property
-from threading import Lock
 
 import numpy as np
 
@@ -20,22 +18,20 @@ from probdmp.checks import BoolArray, FloatArray
 from probdmp.dmp import Primitive, Task
 from probdmp.dmp.joint_model import JointExecutions, JointModel, joint_executions
 from probdmp.execution.joint_filtering import start_deviation, state_moments, update_joint
+from probdmp.execution.kept import Kept
 from probdmp.execution.sensor_array import SensorArray
 from probdmp.gaussian import AugmentedUpdate, Belief, Deviation, predict_deviation
 from probdmp.gaussian.density import log_density_shares
 
-__all__ = ["GainSchedule", "Snapshot", "gain_schedule", "single_execution"]
+__all__ = ["GainSchedule", "Snapshot", "gain_schedule", "kind_of", "single_execution"]
 
 SNAPSHOT_EVERY = 16
 """Ticks between those of which all is kept, so that an execution can go on without the schedule."""
 MOST_KEPT_BYTES = 2**28
 """Of all schedules together that are kept for later executions."""
-LARGEST_MAP = 1024
-"""Numbers of an execution up to which its log-likelihood is one product with a matrix."""
+_KEPT: Kept["GainSchedule"] = Kept(MOST_KEPT_BYTES)
 BLOCK = 1024
 """Executions that are filtered side by side."""
-PANEL = 64
-"""Rows of the map that are multiplied at once: it is a triangle."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,7 +44,7 @@ class Snapshot:
     """Its offset is of no use."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class GainSchedule:
     """Gains for T ticks; P parameters and 3 S states of all signals, O outputs."""
 
@@ -77,8 +73,7 @@ class GainSchedule:
     def n_bytes(self) -> int:
         """About how much memory it takes."""
         kept = sum(s.covariance.nbytes + s.deviation.loading.nbytes for s in self.snapshots)
-        mapped = self.innovation_map.nbytes if "innovation_map" in vars(self) else 0
-        return kept + mapped + self.gains.nbytes + self.rows.nbytes + self.innovation_covariances.nbytes
+        return kept + self.gains.nbytes + self.rows.nbytes + self.innovation_covariances.nbytes
 
     def innovations(self, readings: FloatArray) -> FloatArray:
         """Of readings (T, N, O) less those planned, (T, N, O); what the schedule takes for seen must be there."""
@@ -95,35 +90,13 @@ class GainSchedule:
             of_deviations[:] = of_deviations @ self.transition.T
         return innovations
 
-    @cached_property
-    def innovation_map(self) -> FloatArray:
-        """M, (T O, T O), lower triangular: M readings are independent standard normal numbers; zero for what is not seen.
-
-        Readings are in their order in time, outputs of one tick together.
-        """
-        n_ticks, n_outputs = self.fused.shape
-        size = n_ticks * n_outputs
-        impulses = np.eye(size).reshape(size, n_ticks, n_outputs).swapaxes(0, 1)
-        found = self.innovations(impulses)  # (T, T O, O): of a unit reading at one time
-        whitening = np.linalg.cholesky(self.precisions).mT
-        white = whitening @ np.where(self.fused[:, None], found, 0.0).swapaxes(1, 2)
-        return np.ascontiguousarray(white.reshape(size, size))
-
     def log_likelihoods(self, readings: FloatArray) -> FloatArray:
         """Of complete readings (N, T, O) less those planned, (N,) array, nats."""
-        count, n_numbers = len(readings), self.fused.size
-        squares, is_whole = np.zeros(count), bool(self.fused.all())
-        for first in range(0, count, BLOCK):
-            block = readings[first : first + BLOCK]
-            if n_numbers <= LARGEST_MAP:
-                seen = (block if is_whole else np.where(self.fused, block, 0.0)).reshape(-1, n_numbers)
-                for begin in range(0, n_numbers, PANEL):  # the triangle, but for corners of its steps
-                    end = min(begin + PANEL, n_numbers)
-                    white = seen[:, :end] @ self.innovation_map[begin:end, :end].T
-                    squares[first : first + BLOCK] += np.einsum("nk,nk->n", white, white)
-            else:
-                e = np.where(self.fused[:, None], self.innovations(block.swapaxes(0, 1)), 0.0)
-                squares[first : first + BLOCK] = np.einsum("tno,top,tnp->n", e, self.precisions, e, optimize=True)
+        squares = np.empty(len(readings))
+        for first in range(0, len(readings), BLOCK):
+            innovations = self.innovations(readings[first : first + BLOCK].swapaxes(0, 1))
+            e = np.where(self.fused[:, None], innovations, 0.0)
+            squares[first : first + BLOCK] = np.einsum("tno,top,tnp->n", e, self.precisions, e, optimize=True)
         return float(self.share_constants.sum()) - 0.5 * squares
 
 
@@ -146,23 +119,15 @@ def gain_schedule(
     seen : (T, O) array, what is measured when.
     with_states : whether to compute how certain the states are, which takes the longest.
     """
+    key = (*kind_of(primitive, task, dt, array), seen.shape, seen.tobytes(), with_states)
+    return _KEPT.get(key, lambda: _computed(primitive, task, dt, array, seen, with_states))
+
+
+def kind_of(primitive: Primitive, task: Task, dt: float, array: SensorArray) -> tuple[Hashable, ...]:
+    """What executions have in common that share their gains; arguments as above."""
     told = [np.isnan(part).tobytes() for part in (task.start, task.goal, task.start_velocity) if part is not None]
     sensors = (array.dense_matrix.tobytes(), array.covariance.tobytes(), array.silent.tobytes())
-    key = (primitive.identity, float(task.duration[0]), dt, *told, *sensors, seen.shape, seen.tobytes(), with_states)
-    with _LOCK:
-        if key in _KEPT:
-            _KEPT.move_to_end(key)
-            return _KEPT[key]
-    schedule = _computed(primitive, task, dt, array, seen, with_states)
-    with _LOCK:
-        _KEPT[key] = schedule
-        while len(_KEPT) > 1 and sum(kept.n_bytes for kept in _KEPT.values()) > MOST_KEPT_BYTES:
-            _KEPT.popitem(last=False)
-    return schedule
-
-
-_KEPT: OrderedDict[tuple[object, ...], GainSchedule] = OrderedDict()
-_LOCK = Lock()
+    return primitive.identity, float(task.duration[0]), dt, *told, *sensors
 
 
 def _computed(

@@ -13,9 +13,11 @@ from probdmp.demonstrations import Demonstration
 from probdmp.dmp import Primitive, Task, linear_gaussian_model, stack_tasks, unstack_tasks
 from probdmp.dmp.joint_model import joint_executions
 from probdmp.errors import InputError
+from probdmp.execution.complete_readings import CompleteReadings, complete_readings
 from probdmp.execution.execution_batch import ExecutionBatch
-from probdmp.execution.gain_schedule import gain_schedule
+from probdmp.execution.gain_schedule import gain_schedule, kind_of
 from probdmp.execution.independent_filtering import sensed_system
+from probdmp.execution.kept import Kept
 from probdmp.execution.plans import planned_outputs
 from probdmp.execution.readings import stack_readings
 from probdmp.execution.recordings import BATCH_SIZE, check_recordings, check_tasks, filter_recordings
@@ -26,6 +28,11 @@ __all__ = ["score_batch", "score_recordings"]
 
 FEW = 4
 """Executions for which it does not pay to compute gains once for all."""
+LARGEST_GAUSSIAN = 1024
+"""Readings of an execution up to which all of them together are one draw from a Gaussian."""
+MOST_KEPT_BYTES = 2**27
+"""Of such Gaussians that are kept for later executions."""
+_KEPT: Kept[CompleteReadings] = Kept(MOST_KEPT_BYTES)
 
 
 def score_recordings(
@@ -93,11 +100,14 @@ def _score_for(
 
 
 def _score_joint(primitive: Primitive, batch: ExecutionBatch, array: SensorArray) -> FloatArray:
-    seen = np.ones(batch.observations.shape[1:], dtype=np.bool_)
-    schedule = gain_schedule(primitive, batch.take([0]).tasks, batch.dt, array, seen)
-    executions = joint_executions(primitive, batch.tasks, np.array([batch.dt]), len(seen))
-    expected = planned_outputs(executions, schedule.sensors)
-    return schedule.log_likelihoods(batch.observations - expected)
+    first, (_, n_ticks, n_outputs) = batch.take([0]).tasks, batch.observations.shape
+    executions = joint_executions(primitive, batch.tasks, np.array([batch.dt]), n_ticks)
+    readings = batch.observations - planned_outputs(executions, array.dense_matrix)
+    if n_ticks * n_outputs > LARGEST_GAUSSIAN:
+        seen = np.ones((n_ticks, n_outputs), dtype=np.bool_)
+        return gain_schedule(primitive, first, batch.dt, array, seen).log_likelihoods(readings)
+    key = (*kind_of(primitive, first, batch.dt, array), n_ticks)
+    return _KEPT.get(key, lambda: complete_readings(executions, array)).log_likelihoods(readings)
 
 
 def _score_independent(primitive: Primitive, batch: ExecutionBatch, array: SensorArray) -> FloatArray:
