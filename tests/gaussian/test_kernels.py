@@ -211,12 +211,6 @@ def windows(draw):
     return rng.normal(size=(n_values, n)), rows, maps, which, ends, reach, wanted
 
 
-def squared(module, arguments):
-    found = np.full(int(arguments[6].sum()) * arguments[3].shape[1] * arguments[0].shape[1], -7.0)
-    module.whitened_squares(*arguments, found)
-    return found
-
-
 def squares_one_by_one(values, rows, maps, which, ends, wanted):
     """(wanted, A, n) arrays, each window by itself."""
     mapped = [maps[which[min(place, len(which) - 1)]] for place in range(len(rows))]
@@ -227,12 +221,16 @@ def squares_one_by_one(values, rows, maps, which, ends, wanted):
     return found
 
 
-@given(windows())
-def test_squares_of_windows_are_those_of_each_by_itself(arguments):
+@given(windows(), seeds)
+def test_least_squares_of_windows_are_those_of_each_by_itself(arguments, seed):
     values, rows, maps, which, ends, _, wanted = arguments
-    expected = np.concatenate([some.ravel() for some in squares_one_by_one(values, rows, maps, which, ends, wanted)])
+    penalties = np.random.default_rng(seed).exponential(size=which.shape[1])
+    squares = squares_one_by_one(values, rows, maps, which, ends, wanted)
+    expected = np.concatenate([(some + penalties[:, None]).min(axis=1).ravel() for some in squares])
     for module in {_kernels_numpy, _compiled() if kernels.COMPILED else _kernels_numpy}:
-        assert_same(squared(module, arguments), expected)
+        found = np.full(len(expected), -7.0)
+        module.least_squares(*arguments, penalties, found)
+        assert_same(found, expected)
 
 
 @given(windows(), seeds, st.integers(1, 40), st.sampled_from([1.0, 1e6, 1e-6]))
@@ -274,7 +272,7 @@ def test_windows_that_are_not_there_are_refused(fault):
     rows, which = np.zeros((6, 2), dtype=np.int64), np.array([[0], [1], [1]])
     ends, reach, wanted = np.array([2, 4]), np.array([1, 1, 2, 2]), np.array([6, 3])
     found = np.empty(9 * 3)
-    _compiled().whitened_squares(values, rows, maps, which, ends, reach, wanted, found)
+    _compiled().least_squares(values, rows, maps, which, ends, reach, wanted, np.zeros(1), found)
     if fault == "rows":
         rows[3, 1] = 5
     elif fault == "negative rows":
@@ -292,7 +290,7 @@ def test_windows_that_are_not_there_are_refused(fault):
     else:
         found = np.empty(8 * 3)
     with pytest.raises(ValueError, match="do not belong together"):
-        _compiled().whitened_squares(values, rows, maps, which, ends, reach, wanted, found)
+        _compiled().least_squares(values, rows, maps, which, ends, reach, wanted, np.zeros(1), found)
 
 
 @needs_extension

@@ -70,10 +70,9 @@ class ChannelStatistic:
     def weigh(self, inputs: WindowInputs, length: int) -> FloatArray:
         """Squared distance per number at the first ticks, (length, n) array, of executions of which nothing is unseen."""
         ends = np.array([self._n_movement, len(self._chosen)])
-        of_movement, of_both = self.maps.squares(inputs, self.seen_at, ends, np.array([length, length]))
-        for squares in (of_movement, of_both):
-            squares += ((SHIFTS / SHIFT_STD) ** 2)[:, None]
-        return np.asarray((of_both.min(axis=1) - of_movement.min(axis=1)) / len(CHANNEL_LAGS))
+        penalties = (SHIFTS / SHIFT_STD) ** 2
+        of_movement, of_both = self.maps.squares(inputs, self.seen_at, ends, np.array([length, length]), penalties)
+        return np.asarray((of_both - of_movement) / len(CHANNEL_LAGS))
 
     def look(self, tick: int, window: FloatArray) -> float:
         """The same at one tick, of a window as in `WindowMaps.look`."""

@@ -192,11 +192,12 @@ class Standstill:
     def _resting(self, inputs: WindowInputs, wanted: IntArray) -> list[FloatArray]:
         """Log-densities of what follows places up to each horizon, if it is all where it is there: J arrays (wanted, n)."""
         dof = len(self._rest_stds)
-        squares = self._rest_maps.squares(inputs, np.repeat([0, *self.ahead], dof), self._points_at * dof, wanted)
+        offsets, ends = np.repeat([0, *self.ahead], dof), self._points_at * dof
+        squares = self._rest_maps.squares(inputs, offsets, ends, wanted, np.zeros(1))
         for some, constant in zip(squares, self._constants.tolist(), strict=True):
             some *= -0.5
             some += constant
-        return [some[:, 0] for some in squares]
+        return squares
 
     @cached_property
     def _rest_maps(self) -> WindowMaps:

@@ -14,6 +14,7 @@ from probdmp.checks import BoolArray, FloatArray, IntArray
 from probdmp.detection.calibrated_monitor import LOOKED_AT_AGAIN
 from probdmp.detection.calibration import Calibration
 from probdmp.detection.expectation import Expectation
+from probdmp.detection.movement_channels import as_evidence, as_values
 from probdmp.detection.reasons import LOOKED_BACK, REMEMBERED, better_fit, reasons_for, signal_shares
 from probdmp.detection.recorded_sensors import NEVER
 from probdmp.detection.recorded_ticks import RecordedTicks
@@ -91,10 +92,10 @@ def judge_recorded(
     durations, dts : (N,) arrays, seconds.
     """
     paths, sensors, n = recorded.paths, recorded.sensors, len(recorded.paths)
-    values = expectation.trajectory.values_side_by_side(paths.transpose(1, 2, 0), recorded.goals)
+    evidence = expectation.trajectory.evidence(paths.transpose(1, 2, 0), recorded.goals)
     if np.any(recorded.counts < paths.shape[1]):
-        values[:, np.arange(paths.shape[1])[:, None] >= recorded.counts] = np.nan
-    moments = _moments(standard, values)
+        evidence[:, np.arange(paths.shape[1])[:, None] >= recorded.counts] = np.nan
+    moments = _moments(standard, evidence)
     rows, at = np.arange(n), np.maximum(moments.ticks, 0)
     alarmed_at = np.where(moments.is_alarm, recorded.steps[rows, at], NEVER)
     by_tick = moments.is_alarm & (alarmed_at <= np.minimum(sensors.faulty_from, sensors.stale_from))
@@ -104,7 +105,7 @@ def judge_recorded(
     cases = [at_tick, by_sensor, by_silence]
     steps = np.select(cases, [recorded.steps[rows, at], sensors.faulty_from, sensors.stale_from], 0)
     contributions = np.zeros((n, len(expectation.watched)))
-    contributions[at_tick, : paths.shape[2]] = _shares(expectation, recorded, values, moments, np.flatnonzero(at_tick))
+    contributions[at_tick, : paths.shape[2]] = _shares(expectation, recorded, evidence, moments, np.flatnonzero(at_tick))
     contributions[by_sensor, : paths.shape[2]] = sensors.fault_shares[by_sensor]
     channels = np.array([*standard.channels, "sensor", "silence", ""], dtype=object)
     which = np.select(cases, [moments.channels, len(channels) - 3, len(channels) - 2], len(channels) - 1)
@@ -122,26 +123,27 @@ def judge_recorded(
     )
 
 
-def _moments(standard: Standard, values: FloatArray) -> _Moments:
-    """The first alarm of each execution, or where it comes nearest to one, by values (C, T, N)."""
-    calibration, (n_channels, _, n) = standard.calibration, values.shape
-    highest = np.fmax.reduce(values, axis=1)
-    largest = calibration.surprise(highest.T).max(axis=-1)
+def _moments(standard: Standard, evidence: FloatArray) -> _Moments:
+    """The first alarm of each execution, or where it comes nearest to one, by evidence (C, T, N)."""
+    calibration, (n_channels, _, n) = standard.calibration, evidence.shape
+    highest = np.fmax.reduce(evidence, axis=1)
+    largest = calibration.surprise(as_values(highest).T).max(axis=-1)
     nothing = np.zeros(n, dtype=np.int64)
     moments = _Moments(nothing, nothing.copy(), largest / standard.threshold, np.zeros(n, dtype=np.bool_))
     suspects = np.flatnonzero(moments.ratios > 1)
-    least = np.where(largest > 0, calibration.least_values(largest).T, np.inf)
+    least = as_evidence(np.where(largest > 0, calibration.least_values(largest).T, np.inf))
     least[:, suspects] = np.inf
     first = np.full(n, NEVER)  # by tick, then by channel
     for channel in range(n_channels):
         chosen = np.flatnonzero(highest[channel] >= least[channel])
-        ticks, places = np.nonzero(values[channel][:, chosen] >= least[channel, chosen])
+        ticks, places = np.nonzero(evidence[channel][:, chosen] >= least[channel, chosen])
         k = chosen[places]
-        is_largest = calibration.surprise_of(channel, values[channel, ticks, k]) >= largest[k] * (1 - TIE)
+        surprises = calibration.surprise_of(channel, as_values(evidence[:, ticks, k])[channel])
+        is_largest = surprises >= largest[k] * (1 - TIE)
         np.minimum.at(first, k[is_largest], ticks[is_largest] * n_channels + channel)
     moments.ticks[:] = np.where(first < NEVER, first // n_channels, -1)
     moments.channels[:] = np.where(first < NEVER, first % n_channels, 0)
-    for of_all, some in zip(moments, _alarms(standard, values[:, :, suspects]), strict=True):
+    for of_all, some in zip(moments, _alarms(standard, as_values(evidence[:, :, suspects])), strict=True):
         of_all[suspects] = some
     return moments
 
@@ -159,7 +161,7 @@ def _alarms(standard: Standard, values: FloatArray) -> _Moments:
 
 
 def _shares(
-    expectation: Expectation, recorded: RecordedTicks, values: FloatArray, moments: _Moments, chosen: IntArray
+    expectation: Expectation, recorded: RecordedTicks, evidence: FloatArray, moments: _Moments, chosen: IntArray
 ) -> FloatArray:
     """Contributions of the signals to what was noticed of the chosen executions, (n, S) array."""
     channels, ticks = moments.channels[chosen], _shown(recorded.steps[chosen], moments.ticks[chosen])
@@ -167,7 +169,7 @@ def _shares(
     def windows(some: IntArray, offsets: IntArray) -> FloatArray:
         return recorded.paths[chosen[some, None], np.maximum(ticks[some, None] + offsets, 0)]
 
-    there = values[channels, ticks, chosen]
+    there = evidence[channels, ticks, chosen]
     return signal_shares(expectation.trajectory, channels, ticks, there, recorded.goals[chosen], windows)
 
 

@@ -14,7 +14,9 @@ __all__ = [
     "MOVEMENT_FLOORS",
     "MOVEMENT_HANDICAPS",
     "Horizon",
+    "as_evidence",
     "as_suspicion",
+    "as_values",
     "channels_for",
 ]
 
@@ -30,6 +32,9 @@ MEMORY = max(int(kind.before.max()) + max(kind.horizons) for kind in EVIDENCE) +
 """Ticks that have to be remembered while executing."""
 
 LARGEST_LOG_RATIO = 500.0
+WEIGHED = slice(len(MOVEMENT_CHANNELS) - sum(len(kind.horizons) for kind in EVIDENCE), len(MOVEMENT_CHANNELS))
+"""The channels that are evidence for one account against another."""
+ROUNDING = 1e-12
 EVIDENCE_SCALE = 10.0
 """Nats of evidence that multiply the value of a channel by e."""
 
@@ -63,3 +68,19 @@ def as_suspicion(evidence: FloatArray) -> FloatArray:
     suspicion /= EVIDENCE_SCALE
     np.exp(suspicion, out=suspicion)
     return suspicion
+
+
+def as_values(evidence: FloatArray) -> FloatArray:
+    """Channels (C, …), of which those that weigh two accounts do so in nats, as positive numbers like the others."""
+    values = np.array(evidence)
+    values[WEIGHED] = as_suspicion(evidence[WEIGHED])
+    return values
+
+
+def as_evidence(values: FloatArray) -> FloatArray:
+    """The contrary of `as_values`, safely rounded down."""
+    evidence = np.array(values)
+    with np.errstate(divide="ignore"):
+        logarithms = EVIDENCE_SCALE * np.log(np.maximum(values[WEIGHED], 0.0))
+    evidence[WEIGHED] = logarithms - ROUNDING * (1 + np.abs(np.nan_to_num(logarithms)))
+    return evidence

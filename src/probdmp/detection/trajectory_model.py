@@ -17,7 +17,9 @@ from probdmp.detection.movement_channels import (
     MOVEMENT_FLOORS,
     MOVEMENT_HANDICAPS,
     Horizon,
+    as_evidence,
     as_suspicion,
+    as_values,
     channels_for,
 )
 from probdmp.detection.path_model import PathModel
@@ -34,7 +36,9 @@ __all__ = [
     "MOVEMENT_HANDICAPS",
     "TrajectoryFollower",
     "TrajectoryModel",
+    "as_evidence",
     "as_suspicion",
+    "as_values",
     "channels_for",
 ]
 
@@ -84,22 +88,22 @@ class TrajectoryModel:
         -------
         (n, T, C) array in the order of `channels_for`; the larger, the more suspicious.
         """
-        return self.values_side_by_side(paths.transpose(1, 2, 0), goals).transpose(2, 1, 0)
+        return as_values(self.evidence(paths.transpose(1, 2, 0), goals)).transpose(2, 1, 0)
 
-    def values_side_by_side(self, paths: FloatArray, goals: FloatArray) -> FloatArray:
-        """The same with executions innermost: from paths (T, S, n) to (C, T, n)."""
+    def evidence(self, paths: FloatArray, goals: FloatArray) -> FloatArray:
+        """The same before `as_values`, with executions innermost: from paths (T, S, n) to (C, T, n)."""
         n = paths.shape[-1]
-        values = np.empty((len(MOVEMENT_CHANNELS) + len(self.feel), len(paths), n))
+        evidence = np.empty((len(MOVEMENT_CHANNELS) + len(self.feel), len(paths), n))
         for begin in range(0, n, SIDE_BY_SIDE):
             part = slice(begin, begin + SIDE_BY_SIDE)
-            values[..., part] = self._values(np.ascontiguousarray(paths[..., part]), goals[part])
-        return values
+            self._weigh(np.ascontiguousarray(paths[..., part]), goals[part], evidence[..., part])
+        return evidence
 
-    def _values(self, paths: FloatArray, goals: FloatArray) -> FloatArray:
+    def _weigh(self, paths: FloatArray, goals: FloatArray, values: FloatArray) -> None:
         unseen, length = np.asarray(np.isnan(paths)), len(paths)
         is_lossy = unseen.any()
         inputs = WindowInputs.of(np.where(unseen, 0.0, paths) if is_lossy else paths, self._whole.ahead(goals).T)
-        values = np.full((len(MOVEMENT_CHANNELS) + len(self.feel), length, paths.shape[-1]), np.nan)
+        values[:] = np.nan
         values[0], values[1] = self.position.weigh(inputs, length), self.displacement.weigh(inputs, length)
         for statistic, value in zip(self.feel, values[len(MOVEMENT_CHANNELS) :], strict=True):
             value[...] = statistic.weigh(inputs, length)
@@ -110,8 +114,6 @@ class TrajectoryModel:
         if is_lossy:
             self._look_again(values, paths, unseen, self._whole.means_for(goals))
         values[1] = relative_over_time(values[1])
-        values[2 : len(MOVEMENT_CHANNELS)] = as_suspicion(values[2 : len(MOVEMENT_CHANNELS)])
-        return values
 
     def _look_again(self, values: FloatArray, paths: FloatArray, unseen: BoolArray, means: FloatArray) -> None:
         """Judge windows of which something was not seen by what was seen of them."""

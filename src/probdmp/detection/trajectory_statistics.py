@@ -51,8 +51,8 @@ class Position:
 
     def weigh(self, inputs: WindowInputs, length: int) -> FloatArray:
         """Squared distance at the first ticks, (length, n) array, of executions of which nothing is unseen."""
-        (squares,) = self.windows.squares(inputs, self.offsets, np.ones(1, dtype=np.int64), np.array([length]))
-        return squares[:, 0]
+        (squares,) = self.windows.squares(inputs, self.offsets, np.ones(1, dtype=np.int64), np.array([length]), np.zeros(1))
+        return squares
 
     def look(self, tick: int, window: FloatArray) -> float:
         """The same at one tick, of a window as in `WindowMaps.look`."""
@@ -78,9 +78,9 @@ class Displacement:
 
     def weigh(self, inputs: WindowInputs, length: int) -> FloatArray:
         """The same at the first ticks, (length, n) array, of executions of which nothing is unseen."""
-        (squares,) = self.windows.squares(inputs, self.offsets, np.array([len(LAGS)]), np.array([length]))
-        squares += self.penalties[:, None]
-        return squares.min(axis=1) / inputs.n_dof
+        (squares,) = self.windows.squares(inputs, self.offsets, np.array([len(LAGS)]), np.array([length]), self.penalties)
+        squares /= inputs.n_dof
+        return squares
 
     def look(self, tick: int, window: FloatArray) -> float:
         """The same at one tick, of a window as in `WindowMaps.look`."""

@@ -80,17 +80,24 @@ class WindowMaps:
         white *= white
         return np.asarray(np.add.reduceat(white.reshape(end, n_accounts), starts))
 
-    def squares(self, inputs: WindowInputs, offsets: IntArray, ends: IntArray, wanted: IntArray) -> list[FloatArray]:
-        """Squared lengths of the first outputs, up to each of J ends, at the first places: J arrays (wanted, A, n).
+    def squares(
+        self, inputs: WindowInputs, offsets: IntArray, ends: IntArray, wanted: IntArray, penalties: FloatArray
+    ) -> list[FloatArray]:
+        """Squared lengths of the first outputs, up to each of J ends, at the first places, least over shifts.
 
         Parameters
         ----------
         offsets : (E) tick at which each number of a window is seen, relative to the place.
+        penalties : (A) what is added for each shift.
+
+        Returns
+        -------
+        J arrays (wanted, n).
         """
-        shape = (self.which.shape[1], inputs.values.shape[1])
-        found = np.empty(int(wanted.sum()) * shape[0] * shape[1])
-        kernels.whitened_squares(*self._asked(inputs, offsets, ends, wanted), found)
-        return kernels.split_sums(found, wanted, shape)
+        n = inputs.values.shape[1]
+        found = np.empty(int(wanted.sum()) * n)
+        kernels.least_squares(*self._asked(inputs, offsets, ends, wanted), penalties, found)
+        return kernels.split_sums(found, wanted, n)
 
     def mixtures(
         self, inputs: WindowInputs, offsets: IntArray, ends: IntArray, wanted: IntArray, densities: "Densities"
@@ -100,7 +107,7 @@ class WindowMaps:
         found = np.empty(int(wanted.sum()) * n)
         bases, n_halves, freedom = densities
         kernels.window_mixtures(*self._asked(inputs, offsets, ends, wanted), bases, n_halves, found, freedom)
-        return kernels.split_sums(found, wanted, (n,))
+        return kernels.split_sums(found, wanted, n)
 
     def _asked(
         self, inputs: WindowInputs, offsets: IntArray, ends: IntArray, wanted: IntArray

@@ -130,8 +130,10 @@ class PathWindows:
         sums = np.cumsum(diagonal.reshape(len(diagonal), -1, self._dof).sum(axis=-1), axis=-1)
         return np.asarray(sums[self.maps.which])
 
-    def squares(self, inputs: WindowInputs, offsets: IntArray, points: IntArray, wanted: IntArray) -> list[FloatArray]:
-        """Squared Mahalanobis distances of the first points of windows at the first places, of executions side by side.
+    def squares(
+        self, inputs: WindowInputs, offsets: IntArray, points: IntArray, wanted: IntArray, penalties: FloatArray
+    ) -> list[FloatArray]:
+        """Squared Mahalanobis distances of the first points of windows at the first places, least over shifts.
 
         Parameters
         ----------
@@ -139,12 +141,13 @@ class PathWindows:
         inputs : of D signals or more, of which the first D are meant; what was not seen counts as zero.
         points : (J) increasing: distances of so many points are asked for.
         wanted : (J) at how many places each of them is; not increasing.
+        penalties : (S) what is added for each shift.
 
         Returns
         -------
-        J arrays (wanted, S, n).
+        J arrays (wanted, n), of executions side by side.
         """
-        return self.maps.squares(inputs, np.repeat(offsets, self._dof), points * self._dof, wanted)
+        return self.maps.squares(inputs, np.repeat(offsets, self._dof), points * self._dof, wanted, penalties)
 
     def whiten(self, places: IntArray, windows: FloatArray, means: FloatArray) -> WhiteWindows:
         """Compare windows with the model.

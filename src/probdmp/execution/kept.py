@@ -9,6 +9,8 @@ __all__ = ["Kept"]
 
 
 class Sized(Protocol):
+    """What says how much memory it takes."""
+
     @property
     def n_bytes(self) -> int: ...
 

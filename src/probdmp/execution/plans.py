@@ -20,7 +20,10 @@ def planned_states(executions: JointExecutions) -> FloatArray:
 def planned_outputs(executions: JointExecutions, sensors: FloatArray) -> FloatArray:
     """What is expected of sensors C (O, 3 S) without observations, (N, T, O) array; rows have a batch axis of length 1."""
     model, rows = executions.model, executions.rows[:, 0]
-    means = model.means + np.matmul(model.factors, model.belief.mean[:, None, :, None])[..., 0]
+    if len(model.factors) == 1:  # one product of matrices for all executions
+        means = model.means + np.tensordot(model.belief.mean, model.factors[0], axes=(1, 2))
+    else:
+        means = model.means + np.matmul(model.factors, model.belief.mean[:, None, :, None])[..., 0]
     by_state = sensors.reshape(len(sensors), -1, 3)
     outputs = np.einsum("osk,tkn->tosn", by_state, rows).reshape(len(rows) * len(sensors), -1)
     return np.asarray(means.reshape(len(means), -1) @ outputs.T).reshape(-1, len(rows), len(sensors))

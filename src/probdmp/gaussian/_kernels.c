@@ -146,7 +146,8 @@ typedef struct {
     Py_ssize_t n, n_values, n_places, n_inputs, n_maps, n_outputs, n_mapped, n_accounts, n_sums;
     const double *values, *maps;
     const int64_t *rows, *which, *ends, *reach, *wanted;
-    const double *scales; /* of mixtures; none where squares are asked for */
+    const double *penalties; /* of the least squares; none where mixtures are asked for */
+    const double *scales;
     const int64_t *n_halves;
     double inverse;
     int64_t *extents; /* to work in: so are the following */
@@ -183,6 +184,7 @@ typedef struct {
 #define pack NAMED(pack)
 #define square_outputs NAMED(square_outputs)
 #define mix_lane NAMED(mix_lane)
+#define least_lane NAMED(least_lane)
 #define look_at_lane NAMED(look_at_lane)
 #define look_at_windows NAMED(look_at_windows)
 
@@ -355,7 +357,7 @@ static PyObject *smoothed_states(PyObject *module, PyObject *const *arguments, P
 #define WINDOWS {"values", 0, 2, 0}, {"rows", 0, 2, 1}, {"maps", 0, 3, 0}, {"which", 0, 2, 1}, {"ends", 0, 1, 1}, \
                 {"reach", 0, 1, 1}, {"wanted", 0, 1, 1}
 
-static int windows_fit(const Array *x, const Array *found, int per_account, Windows *s)
+static int windows_fit(const Array *x, const Array *found, Windows *s)
 {
     *s = (Windows){
         .n = x[0].view.shape[1], .n_values = x[0].view.shape[0], .n_places = x[1].view.shape[0], .n_inputs = x[1].view.shape[1],
@@ -371,7 +373,7 @@ static int windows_fit(const Array *x, const Array *found, int per_account, Wind
     for (Py_ssize_t j = 0; is_sound && j < s->n_sums; j++) {
         is_sound = s->ends[j] > (j ? s->ends[j - 1] : 0) && s->ends[j] <= s->n_outputs && s->wanted[j] >= 0
                    && s->wanted[j] <= (j ? s->wanted[j - 1] : s->n_places);
-        size += s->wanted[j] * (per_account ? s->n_accounts : 1) * s->n;
+        size += s->wanted[j] * s->n;
     }
     for (Py_ssize_t i = 0; is_sound && i < s->n_outputs; i++)
         is_sound = s->reach[i] >= (i ? s->reach[i - 1] : 0) && s->reach[i] <= s->n_inputs;
@@ -406,14 +408,18 @@ static int look(Windows *s, double *found)
     return has_memory;
 }
 
-static PyObject *whitened_squares(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
+static PyObject *least_squares(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
 {
-    static const Spec specs[] = {WINDOWS, {"found", 1, 1, 0}};
+    static const Spec specs[] = {WINDOWS, {"penalties", 0, 1, 0}, {"found", 1, 1, 0}};
     enum { COUNT = sizeof(specs) / sizeof(specs[0]) };
     Array x[COUNT];
     Windows s;
     if (take(arguments, given, specs, COUNT, x) < 0) return NULL;
-    const int done = windows_fit(x, &x[COUNT - 1], 1, &s) && look(&s, x[COUNT - 1].data);
+    int done = windows_fit(x, &x[COUNT - 1], &s) && agree(&x[7], "penalties", s.n_accounts, 0, 0, 0);
+    if (done) {
+        s.penalties = x[7].data;
+        done = look(&s, x[COUNT - 1].data);
+    }
     release(x, COUNT);
     if (!done) return NULL;
     Py_RETURN_NONE;
@@ -431,7 +437,7 @@ static PyObject *window_mixtures(PyObject *module, PyObject *const *arguments, P
     }
     const double freedom = PyFloat_AsDouble(arguments[COUNT]);
     if (PyErr_Occurred() || take(arguments, COUNT, specs, COUNT, x) < 0) return NULL;
-    int done = windows_fit(x, &x[COUNT - 1], 0, &s);
+    int done = windows_fit(x, &x[COUNT - 1], &s);
     done = done && agree(&x[7], "scales", s.n_mapped, s.n_sums, s.n_accounts, 0) && agree(&x[8], "n_halves", s.n_sums, 0, 0, 0);
     if (done) {
         s.scales = x[7].data;
@@ -450,7 +456,7 @@ static PyObject *window_mixtures(PyObject *module, PyObject *const *arguments, P
 
 static PyMethodDef functions[] = {
     FUNCTION(filter_systems), FUNCTION(filter_step), FUNCTION(squared_innovations), FUNCTION(smoothed_states),
-    FUNCTION(whitened_squares), FUNCTION(window_mixtures),
+    FUNCTION(least_squares), FUNCTION(window_mixtures),
     {NULL, NULL, 0, NULL},
 };
 
@@ -958,10 +964,18 @@ INLINE Lane mix_lane(const Windows *s, const double *scales, Py_ssize_t n_halves
     return plus(logarithm(total), -n_halves / 2.0, logarithm(least));
 }
 
-/* What is asked about one place of some executions; arrays (wanted, A, n) of sums up to each end, or (wanted, n) of mixtures. */
+INLINE Lane least_lane(const Windows *s)
+{
+    Lane least = plus_number(load(s->sums), s->penalties[0]);
+    for (Py_ssize_t a = 1; a < s->n_accounts; a++)
+        least = smaller(plus_number(load(s->sums + a * WIDTH), s->penalties[a]), least);
+    return least;
+}
+
+/* What is asked about one place of some executions, up to each end: arrays (wanted, n), one after the other. */
 INLINE void look_at_lane(const Windows *s, Py_ssize_t place, Py_ssize_t mapped, Py_ssize_t first, Py_ssize_t width, double *found)
 {
-    const Py_ssize_t a = s->n_accounts, n = s->n, columns = s->scales ? 1 : a;
+    const Py_ssize_t a = s->n_accounts, n = s->n;
     const double *packed = s->packed;
     const int64_t *extents = s->extents, *rows = s->rows + place * s->n_inputs;
     for (Py_ssize_t k = 0; k < s->n_inputs; k++) {
@@ -978,11 +992,17 @@ INLINE void look_at_lane(const Windows *s, Py_ssize_t place, Py_ssize_t mapped, 
         packed = square_outputs(s, packed, extents, n_groups);
         extents += n_groups;
         begin = s->ends[j];
-        double mixed[WIDTH];
-        if (s->scales) store(mixed, mix_lane(s, s->scales + (mapped * s->n_sums + j) * a, s->n_halves[j]));
-        for (Py_ssize_t i = 0; i < columns; i++)
-            memcpy(found + (place * columns + i) * n + first, s->scales ? mixed : s->sums + i * WIDTH, width * sizeof(double));
-        found += s->wanted[j] * columns * n;
+        const double *scales = s->scales + (mapped * s->n_sums + j) * a;
+        const Lane answer = s->penalties ? least_lane(s) : mix_lane(s, scales, s->n_halves[j]);
+        double *to = found + place * n + first;
+        if (width == WIDTH)
+            store(to, answer);
+        else {
+            double some[WIDTH];
+            store(some, answer);
+            memcpy(to, some, width * sizeof(double));
+        }
+        found += s->wanted[j] * n;
     }
 }
 

@@ -5,8 +5,6 @@
 All arrays are float64 and C-contiguous; the last arguments are written to. NaN marks what was not observed.
 """
 
-import math
-
 import numpy as np
 
 from probdmp.checks import LARGEST_MAGNITUDE, FloatArray, IntArray
@@ -14,10 +12,10 @@ from probdmp.checks import LARGEST_MAGNITUDE, FloatArray, IntArray
 __all__ = [
     "filter_step",
     "filter_systems",
+    "least_squares",
     "smoothed_states",
     "split_sums",
     "squared_innovations",
-    "whitened_squares",
     "window_mixtures",
 ]
 
@@ -167,7 +165,7 @@ def smoothed_states(
             smoothed[block, t] = path_states[t] + np.moveaxis(corrected, -1, 0).mT
 
 
-def whitened_squares(
+def least_squares(
     values: FloatArray,
     rows: IntArray,
     maps: FloatArray,
@@ -175,9 +173,10 @@ def whitened_squares(
     ends: IntArray,
     reach: IntArray,
     wanted: IntArray,
+    penalties: FloatArray,
     found: FloatArray,
 ) -> None:
-    """Squared length of windows after linear maps, summed up to several of their outputs.
+    """Squared length of windows after linear maps, up to several of their outputs: the least over accounts of a place.
 
     Parameters
     ----------
@@ -188,13 +187,30 @@ def whitened_squares(
     ends : (J) increasing; sums run over outputs 0, 1, ..., end - 1.
     reach : (R) how many inputs, the first ones of a window, an output depends on; not decreasing.
     wanted : (J) at how many places, the first ones, each of the sums is asked for; not increasing.
-    found : written: J arrays (wanted, A, n), one after the other.
+    penalties : (A) what is added to the squares of each account.
+    found : written: J arrays (wanted, n), one after the other.
     """
+    sums = _squares(values, rows, maps, which, ends, reach, wanted)
+    for squares, least in zip(sums, split_sums(found, wanted, values.shape[1]), strict=True):
+        np.add(squares, penalties[:, None], out=squares)
+        np.minimum.reduce(squares, axis=1, out=least)
+
+
+def _squares(
+    values: FloatArray,
+    rows: IntArray,
+    maps: FloatArray,
+    which: IntArray,
+    ends: IntArray,
+    reach: IntArray,
+    wanted: IntArray,
+) -> list[FloatArray]:
+    """J arrays (wanted, A, n)."""
     n, n_accounts = values.shape[1], which.shape[1]
-    sums = split_sums(found, wanted, (n_accounts, n))
+    sums = [np.empty((count, n_accounts, n)) for count in wanted.tolist()]
     if n <= FEW:
         _look_at_all_places(values, rows, maps, which, ends, sums)
-        return
+        return sums
     window = np.empty((maps.shape[2], n))
     outputs = np.empty((int(np.diff(ends, prepend=0).max()) * n_accounts, n))
     for place in range(int(wanted[0])):
@@ -210,6 +226,7 @@ def whitened_squares(
             if j:
                 sums[j][place] += sums[j - 1][place]
             begin = end
+    return sums
 
 
 def window_mixtures(
@@ -233,19 +250,16 @@ def window_mixtures(
     n_halves : (J)
     found : written: J arrays (wanted, n), one after the other.
     """
-    n, n_accounts = values.shape[1], which.shape[1]
-    squares = np.empty(int(wanted.sum()) * n_accounts * n)
-    whitened_squares(values, rows, maps, which, ends, reach, wanted, squares)
-    mixtures = split_sums(found, wanted, (n,))
-    for j, (some, mixed) in enumerate(zip(split_sums(squares, wanted, (n_accounts, n)), mixtures, strict=True)):
+    sums, mixtures = _squares(values, rows, maps, which, ends, reach, wanted), split_sums(found, wanted, values.shape[1])
+    for j, (some, mixed) in enumerate(zip(sums, mixtures, strict=True)):
         own = scales[np.minimum(np.arange(len(some)), len(scales) - 1), j]
         _mix(some, own, mixed, int(n_halves[j]), freedom)
 
 
-def split_sums(found: FloatArray, wanted: IntArray, shape: tuple[int, ...]) -> list[FloatArray]:
-    """The J arrays (wanted, *shape) that are written one after the other."""
-    parts = np.split(found, np.cumsum(wanted * math.prod(shape))[:-1])
-    return [part.reshape(count, *shape) for part, count in zip(parts, wanted, strict=True)]
+def split_sums(found: FloatArray, wanted: IntArray, n: int) -> list[FloatArray]:
+    """The J arrays (wanted, n) that are written one after the other."""
+    ends = np.cumsum(wanted * n).tolist()
+    return [found[end - count * n : end].reshape(count, n) for end, count in zip(ends, wanted.tolist(), strict=True)]
 
 
 def _mix(squares: FloatArray, scales: FloatArray, mixed: FloatArray, n_halves: int, freedom: float) -> None:

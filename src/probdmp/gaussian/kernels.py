@@ -18,10 +18,10 @@ __all__ = [
     "filter_step",
     "filter_systems",
     "in_threads",
+    "least_squares",
     "smoothed_states",
     "split_sums",
     "squared_innovations",
-    "whitened_squares",
     "window_mixtures",
 ]
 
@@ -52,7 +52,7 @@ filter_systems: Callable[..., None] = _kernels.filter_systems
 filter_step: Callable[..., int] = _kernels.filter_step
 squared_innovations: Callable[..., None] = _kernels.squared_innovations
 smoothed_states: Callable[..., None] = _kernels.smoothed_states
-whitened_squares: Callable[..., None] = _kernels.whitened_squares
+least_squares: Callable[..., None] = _kernels.least_squares
 window_mixtures: Callable[..., None] = _kernels.window_mixtures
 split_sums = _kernels_numpy.split_sums
 
