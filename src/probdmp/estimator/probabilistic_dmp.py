@@ -253,6 +253,10 @@ class ProbabilisticDMP(HasPrimitive):
         asked = tasks if tasks is not None else [task_of_recording(primitive, recording) for recording in recordings]
         return score_recordings(primitive, asked, recordings, self._array(sensors))
 
+    def score(self, executions: Recordings, dt: float | None = None, tasks: Sequence[Task] | None = None) -> float:
+        """Mean of `score_samples`, nats per execution: what a search of scikit-learn maximises."""
+        return float(np.mean(self.score_samples(executions, dt, tasks)))
+
     def sample(
         self,
         n_samples: int = 1,
