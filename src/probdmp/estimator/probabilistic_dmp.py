@@ -13,7 +13,7 @@ from probdmp.demonstrations import Demonstration, Recording, Recordings, as_demo
 from probdmp.detection import FailureDetector
 from probdmp.dmp import PUBLISHED, Configuration, Task, ViaPoint, condition_primitive, task_for
 from probdmp.errors import InputTypeError
-from probdmp.estimator.learned import HasPrimitive
+from probdmp.estimator.familiar import HasFamiliarVerbs
 from probdmp.estimator.saving import write_learned
 from probdmp.execution import (
     GaussianTrajectory,
@@ -41,7 +41,7 @@ __all__ = ["ProbabilisticDMP"]
 MOST_SAMPLES = 10_000
 
 
-class ProbabilisticDMP(HasPrimitive):
+class ProbabilisticDMP(HasFamiliarVerbs):
     """A probabilistic Dynamic Movement Primitive: learn a movement, roll it out, execute it with feedback, judge it.
 
     Parameters
