@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from probdmp.checks import BoolArray, FloatArray, check_array, check_positive, check_seconds, freeze_arrays, shape_text
+from probdmp.checks import BoolArray, FloatArray, check_array, check_positive, check_seconds, freeze_arrays
 from probdmp.dmp import Configuration, Primitive
 from probdmp.dmp.basis import basis_features
 from probdmp.dmp.phase import phases_at
