@@ -35,7 +35,8 @@ class HasParameters:
 
     def set_params(self, **parameters: Any) -> Self:
         """Change constructor's arguments by name; `argument__name` changes one of an argument that is an estimator itself."""
-        for name, value in parameters.items():
+        # First whole arguments, then what is inside them.
+        for name, value in sorted(parameters.items(), key=lambda item: "__" in item[0]):
             check_choice(name, "the name of a parameter", self.get_params())
             part, _, inner = name.partition("__")
             if inner:

@@ -250,6 +250,8 @@ def test_what_is_inside_is_searched_by_two_underscores(rows):
     assert set(detector.get_params(deep=False)) == {"detector", "dmp", "n_dof", "dt"}
     detector.set_params(detector__false_alarm_rate=0.2, dmp__n_basis=4)
     assert (detector.detector.false_alarm_rate, detector.dmp.n_basis) == (0.2, 4)
+    detector.set_params(dmp__n_basis=6, dmp=ProbabilisticDMP(alpha_z=20.0))
+    assert (detector.dmp.n_basis, detector.dmp.alpha_z) == (6, 20.0)
     with pytest.raises(InputError, match="the name of a parameter"):
         detector.set_params(dmp__basis=4)
 

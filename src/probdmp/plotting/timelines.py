@@ -6,14 +6,23 @@ from types import MappingProxyType
 
 import numpy as np
 
-from probdmp.checks import FloatArray
+from probdmp.checks import FloatArray, IntArray
 from probdmp.demonstrations import Demonstration
 from probdmp.evaluation import JudgedExecution
 from probdmp.execution import GaussianTrajectory
 from probdmp.plotting.style import FAULTY, MEAN, RECORDED, axis_label
 from probdmp.plotting.trajectories import QUANTITIES
 
-__all__ = ["HALF_WIDTH", "Event", "Timelines", "Track", "monitored_timelines", "rollout_timelines", "smoothing_timelines"]
+__all__ = [
+    "HALF_WIDTH",
+    "Event",
+    "Timelines",
+    "Track",
+    "monitored_timelines",
+    "nanoseconds_of",
+    "rollout_timelines",
+    "smoothing_timelines",
+]
 
 HALF_WIDTH = 2.0
 """Standard deviations from the mean to `lower` and `upper`."""
@@ -64,7 +73,7 @@ class Timelines:
     heading: str = ""
 
 
-def nanoseconds_of(times: FloatArray) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
+def nanoseconds_of(times: FloatArray) -> IntArray:
     """(T,) array of whole numbers from (T,) seconds."""
     return np.asarray(np.rint(times * 1e9), dtype=np.int64)
 
