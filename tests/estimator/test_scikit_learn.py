@@ -22,6 +22,7 @@ from sklearn.exceptions import NotFittedError, SkipTestWarning
 from sklearn.model_selection import GridSearchCV, KFold, cross_val_score
 from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import FunctionTransformer
+from sklearn.utils import estimator_checks
 from sklearn.utils.estimator_checks import check_estimator
 
 TWO_COLUMNS = "its table has two columns, and a movement needs three samples"
@@ -108,6 +109,21 @@ def test_scikit_learn_is_told_that_a_table_is_not_for_estimators_of_lists(estima
         check_estimator(estimator)
 
 
+NO_DATA = (
+    *("check_estimator_cloneable", "check_estimator_tags_renamed", "check_valid_tag_types", "check_estimator_repr"),
+    *("check_no_attributes_set_in_init", "check_do_not_raise_errors_in_init_or_set_params", "check_mixin_order"),
+    *("check_parameters_default_constructible", "check_get_params_invariance", "check_set_params"),
+)
+"""Those of its checks that need no table."""
+
+
+@pytest.mark.filterwarnings("ignore:Estimator .* does not inherit from `sklearn.base.BaseEstimator`")
+@pytest.mark.parametrize("check", NO_DATA)
+@pytest.mark.parametrize("estimator", [ProbabilisticDMP(5), FailureDetector()], ids=lambda e: type(e).__name__)
+def test_estimators_of_lists_pass_every_check_that_needs_no_table(estimator, check):
+    getattr(estimator_checks, check)(type(estimator).__name__, estimator)
+
+
 def test_the_table_in_the_documentation_is_the_one_tested():
     page = (Path(__file__).parents[2] / "docs/how-to/conventions.md").read_text()
     listed = dict(re.findall(r"^\| `(check_\w+)` \| [^|]+ \| ([^|]+) \|$", page, flags=re.M))
@@ -129,6 +145,17 @@ def test_fit_returns_self_changes_no_parameter_and_is_repeatable(rows):
         assert estimator.n_features_in_ == 50
         with pytest.raises(ValueError, match=r"X has 48 features, but .* is expecting 50 features as input"):
             estimator.score_samples(rows[:, :48])
+
+
+def test_rows_may_be_lists_and_a_detector_agrees_with_itself(rows):
+    flat = flat_dmp().fit(rows)
+    np.testing.assert_array_equal(flat_dmp().fit(rows.tolist()).score_samples(rows.tolist()), flat.score_samples(rows))
+    detector, fresh = flat_detector(), flat_detector()
+    np.testing.assert_array_equal(detector.fit_predict(rows), fresh.fit(rows).predict(rows))
+    decision = detector.decision_function(rows)
+    assert decision.shape == (8,)
+    np.testing.assert_array_equal(decision, detector.score_samples(rows) - detector.offset_)
+    np.testing.assert_array_equal(decision >= 0, detector.predict(rows) == 1)
 
 
 def test_rows_need_a_fit_first(rows):
