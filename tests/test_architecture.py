@@ -10,7 +10,7 @@ import probdmp
 
 ROOT = Path(probdmp.__file__).parent
 LAYERS = (
-    *("errors", "checks", "gaussian", "demonstrations", "dmp", "io", "learning", "execution", "detection"),
+    *("errors", "checks", "parameters", "gaussian", "demonstrations", "dmp", "io", "learning", "execution", "detection"),
     *("evaluation", "estimator", "plotting", "fleet", "cli"),
 )
 """From the bottom up: a module imports only from names before its own."""

@@ -2,7 +2,10 @@
 
 import json
 import re
+import shlex
+import shutil
 import xml.etree.ElementTree as ElementTree
+from pathlib import Path
 
 import pytest
 from html_pages import check_page
@@ -10,7 +13,7 @@ from matplotlib.axes import Axes
 
 from probdmp import write_demonstrations
 from probdmp.cli.pictures import KINDS
-from probdmp.cli.plot import FORMATS
+from probdmp.cli.plot import FORMATS, VIEWERS
 from probdmp.demonstrations import Demonstration
 from probdmp.plotting.panels import FORMATS as DRAWN
 
@@ -53,6 +56,59 @@ def test_every_format(suffix, begins, place, run_json, tmp_path):
     assert run_json("plot", "basis", place / "c.probdmp", "-o", picture) == {"written": str(picture)}
     assert picture.read_bytes().startswith(begins)
     assert FORMATS == DRAWN
+
+
+@pytest.mark.parametrize("what", ["rollout", "smoothing", "monitor"])
+@pytest.mark.parametrize(("suffix", "library", "magic"), [(".mcap", "foxglove", b"\x89MCAP0\r\n"), (".rrd", "rerun", b"RRF2")])
+def test_what_is_over_time_goes_to_viewers_too(what, suffix, library, magic, place, run, tmp_path):
+    pytest.importorskip(library, reason=f"needs the extra {library}: pip install 'probdmp[{library}]'")
+    assert suffix in VIEWERS
+    picture = tmp_path / f"p{suffix}"
+    result = run("plot", what, *in_place(place, ARGUMENTS[what]), "-o", picture)
+    assert (result.exit_code, result.stderr, result.stdout) == (0, "", f"Wrote {picture}\n")
+    assert picture.read_bytes().startswith(magic)
+
+
+def test_an_alarm_of_the_program_is_in_the_file_for_foxglove(place, run, tmp_path):
+    pytest.importorskip("foxglove", reason="needs the extra foxglove: pip install 'probdmp[foxglove]'")
+    decoder = pytest.importorskip("mcap_protobuf.decoder", reason="needs mcap-protobuf-support")
+    from mcap.reader import make_reader
+
+    arguments = ("letters.probdmp", "blocked.npz", "--label", "c", "--index", 1)
+    assert run("plot", "monitor", *in_place(place, arguments), "-o", tmp_path / "p.mcap").exit_code == 0
+    shown = run("monitor", place / "letters.probdmp", place / "blocked.npz", "--label", "c").stdout.splitlines()[1]
+    with (tmp_path / "p.mcap").open("rb") as file:
+        reader = make_reader(file, decoder_factories=[decoder.DecoderFactory()])
+        (log,) = [decoded.decoded_message for decoded in reader.iter_decoded_messages(topics=["/log"])]
+        (heading,) = [metadata.metadata["heading"] for metadata in reader.iter_metadata()]
+    assert log.message == shown.split("  ", 1)[1]
+    assert log.message.startswith("failed at")
+    assert heading == f"c, recording 1: {log.message}"
+
+
+def test_the_page_on_viewers_runs_for_rerun_too(place, run, tmp_path, monkeypatch):
+    """tests/test_docs.py runs what needs no rerun-sdk."""
+    pytest.importorskip("rerun", reason="needs the extra rerun: pip install 'probdmp[rerun]'")
+    page = (Path(__file__).parents[2] / "docs/how-to/viewers.md").read_text()
+    (block,) = re.findall(r"^```console\n(.*?)^```$", page, flags=re.M | re.S)
+    commands = [shlex.split(line) for line in block.splitlines() if line.startswith("probdmp ")]
+    assert len(commands) == 3
+    monkeypatch.chdir(tmp_path)
+    for name in ("letters.probdmp", "blocked.npz", "letters.npz"):
+        shutil.copy(place / name, "executions.npz" if name == "letters.npz" else name)
+    for _, *arguments in commands:
+        result = run(*["c" if word == "a" else word for word in arguments])
+        assert (result.exit_code, result.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(("suffix", "module"), [(".mcap", "foxglove"), (".rrd", "rerun")])
+def test_a_viewer_that_is_not_there_is_said_before_any_work(suffix, module, place, run, tmp_path, monkeypatch):
+    monkeypatch.setattr(f"probdmp.plotting.{module}.find_spec", lambda name: None)
+    monkeypatch.setattr("probdmp.plotting.style.find_spec", lambda name: pytest.fail("matplotlib is not needed"))
+    result = run("plot", "rollout", place / "c.probdmp", "-o", tmp_path / f"p{suffix}")
+    assert result.exit_code == 1
+    assert f"pip install 'probdmp[{module}]'" in result.stderr
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_default_name(place, run, tmp_path, monkeypatch):
@@ -106,7 +162,9 @@ def test_one_degree_of_freedom(run, tmp_path, letters):
     ("arguments", "code", "message"),
     [
         (("bogus", "c.probdmp"), 2, "expected WHAT to be one of demonstrations, basis"),
-        (("basis", "c.probdmp", "-o", "p.gif"), 2, "ends in .svg or .png or .pdf, got 'p.gif'"),
+        (("basis", "c.probdmp", "-o", "p.gif"), 2, "ends in .svg or .png or .pdf or .mcap or .rrd, got 'p.gif'"),
+        (("basis", "c.probdmp", "-o", "p.mcap"), 2, "one of rollout, smoothing, monitor for a .mcap file, got basis"),
+        (("operating", "evaluation.json", "-o", "p.rrd"), 2, "one of rollout, smoothing, monitor for a .rrd file"),
         (("basis", "c.probdmp", "-o", "none/p.svg"), 2, "a folder that exists"),
         (("basis", "letters.probdmp"), 2, "--label to be one of those in the model"),
         (("basis", "c.probdmp", "--goal", "1,2"), 2, "of basis only --label, got --goal"),

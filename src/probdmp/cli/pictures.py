@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from probdmp.estimator import ProbabilisticDMP
     from probdmp.evaluation import JudgeRecord
     from probdmp.plotting.panels import Panel
+    from probdmp.plotting.timelines import Timelines
 
 __all__ = ["KINDS", "Kind", "Picture", "PictureRequest", "picture_of"]
 
@@ -42,6 +43,8 @@ class Picture:
     panels: "Sequence[Panel]"
     columns: int
     heading: str = ""
+    timelines: "Timelines | None" = None
+    """The same values for viewers of time series, of kinds that are `over_time`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +55,8 @@ class Kind:
     files: str
     options: tuple[str, ...] = ()
     needs_execution: bool = False
+    over_time: bool = False
+    """Whether viewers of time series can show it."""
 
 
 def picture_of(what: str, request: PictureRequest) -> Picture:
@@ -86,12 +91,14 @@ def _forcing(request: PictureRequest) -> Picture:
 
 
 def _rollout(request: PictureRequest) -> Picture:
+    from probdmp.plotting.timelines import rollout_timelines
     from probdmp.plotting.trajectories import band_panels
 
     label, learned = _learned(request)
     with usage():
         planned = learned.rollout(**request.task.arguments(learned.primitive_))
-    return Picture(band_panels(planned, range(len(planned.names))), 3, f"Rollout of {name_text(label)}, 95 % bands")
+    panels = band_panels(planned, range(len(planned.names)))
+    return Picture(panels, 3, f"Rollout of {name_text(label)}, 95 % bands", rollout_timelines(planned))
 
 
 def _path(request: PictureRequest) -> Picture:
@@ -115,6 +122,7 @@ def _path(request: PictureRequest) -> Picture:
 def _smoothing(request: PictureRequest) -> Picture:
     from probdmp.estimator import PrimitiveLibrary
     from probdmp.plotting.executions import smoothing_panels
+    from probdmp.plotting.timelines import smoothing_timelines
 
     assert request.execution is not None, "checked"
     library = PrimitiveLibrary.load(request.file)
@@ -122,7 +130,8 @@ def _smoothing(request: PictureRequest) -> Picture:
     arguments = request.task.arguments(learned.primitive_)
     tracked, smoothed = learned.track(recording, **arguments), learned.smooth(recording, **arguments)
     heading = f"{name_text(label)}, recording {request.index}: log-likelihood {tracked.log_likelihoods.sum():.1f} nats"
-    return Picture(smoothing_panels(recording, tracked, smoothed), 3, heading)
+    timelines = smoothing_timelines(recording, tracked, smoothed)
+    return Picture(smoothing_panels(recording, tracked, smoothed), 3, heading, timelines)
 
 
 def _monitor(request: PictureRequest) -> Picture:
@@ -130,6 +139,7 @@ def _monitor(request: PictureRequest) -> Picture:
     from probdmp.estimator import PrimitiveLibrary, load_detector
     from probdmp.evaluation import judge_execution
     from probdmp.plotting.monitoring import monitoring_panels
+    from probdmp.plotting.timelines import monitored_timelines
 
     assert request.execution is not None, "checked"
     library, detector = PrimitiveLibrary.load(request.file), load_detector(request.file)
@@ -146,7 +156,8 @@ def _monitor(request: PictureRequest) -> Picture:
     judged = judge_execution(detector, primitive, task, recording)
     planned = learned.rollout(dt=recording.dt, **arguments | {"start": primitive.starts(task)})
     heading = f"{name_text(label)}, recording {request.index}: {judged.verdict}"
-    return Picture(monitoring_panels(planned, judged, request.onset), 2, heading)
+    timelines = monitored_timelines(planned, judged, request.onset)
+    return Picture(monitoring_panels(planned, judged, request.onset), 2, heading, timelines)
 
 
 def _operating(request: PictureRequest) -> Picture:
@@ -197,10 +208,10 @@ KINDS: dict[str, Kind] = {
     "demonstrations": Kind(_demonstrations, "FILE", ("--label", "--columns", "--dof")),
     "basis": Kind(_basis, "MODEL", ("--label",)),
     "forcing": Kind(_forcing, "MODEL", ("--label",)),
-    "rollout": Kind(_rollout, "MODEL", ("--label", *TASK)),
+    "rollout": Kind(_rollout, "MODEL", ("--label", *TASK), over_time=True),
     "path": Kind(_path, "MODEL", ("--label", *TASK, "--dof")),
-    "smoothing": Kind(_smoothing, "MODEL EXECUTION", ("--label", "--index", *TASK), needs_execution=True),
-    "monitor": Kind(_monitor, "MODEL EXECUTION", ("--label", "--index", *TASK, "--onset"), needs_execution=True),
+    "smoothing": Kind(_smoothing, "MODEL EXECUTION", ("--label", "--index", *TASK), True, over_time=True),
+    "monitor": Kind(_monitor, "MODEL EXECUTION", ("--label", "--index", *TASK, "--onset"), True, over_time=True),
     "operating": Kind(_operating, "EVALUATION.json"),
     "onset": Kind(_onset, "EVALUATION.json"),
 }

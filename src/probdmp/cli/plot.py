@@ -1,6 +1,7 @@
 """`probdmp plot`: pictures of data, models, executions and evaluations."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -21,11 +22,14 @@ from probdmp.cli.options import (
     names_of,
 )
 from probdmp.cli.output import print_json, print_line
-from probdmp.cli.pictures import KINDS, PictureRequest, picture_of
+from probdmp.cli.pictures import KINDS, Picture, PictureRequest, picture_of
 
 __all__ = ["plot"]
 
 FORMATS = (".svg", ".png", ".pdf")
+VIEWERS = (".mcap", ".rrd")
+"""Suffixes of files that viewers of time series draw themselves: Foxglove, Rerun."""
+OVER_TIME = [name for name, kind in KINDS.items() if kind.over_time]
 WHAT_HELP = "One of: " + ", ".join(f"{name} ({kind.files})" for name, kind in KINDS.items()) + "."
 
 
@@ -39,7 +43,12 @@ def plot(
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", metavar="PICTURE", help="Ends in .svg, .png or .pdf. Default: FILE-WHAT.svg, here."),
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="PICTURE",
+            help="Ends in .svg, .png or .pdf; or in .mcap or .rrd, for Foxglove and Rerun. Default: FILE-WHAT.svg, here.",
+        ),
     ] = None,
     label: Label = None,
     index: Index = 0,
@@ -66,6 +75,9 @@ def plot(
 
     Lines differ in more than colour, so pictures can be printed in black and white. Needs the extra: pip install
     'probdmp[plot]'.
+
+    rollout, smoothing and monitor also go to Foxglove, -o x.mcap, and Rerun, -o x.rrd, with bands of 2 standard deviations and
+    the verdict as a log message. These need the extras probdmp[foxglove] and probdmp[rerun], and no matplotlib.
     """
     if what not in KINDS:
         raise UsageError(f"WHAT to be one of {', '.join(KINDS)}", repr(what))
@@ -73,21 +85,54 @@ def plot(
     given |= {"--start-velocity": start_velocity, "--columns": columns, "--dof": dof, "--onset": onset}
     _check_fits(what, execution, given)
     path = Path(f"{file.stem}-{what}.svg") if output is None else output
-    check_output(path, *FORMATS)
-    from probdmp.plotting.style import require_matplotlib
-
-    require_matplotlib()
+    check_output(path, *FORMATS, *VIEWERS)
+    _require(path, what)
     task = TaskOptions(start, goal, duration, start_velocity)
     request = PictureRequest(file, execution, label, index, task, names_of(columns), names_of(dof), onset)
     picture = picture_of(what, request)
-    from probdmp.plotting.panels import save_panels
-
     with usage():
-        save_panels(path, picture.panels, picture.columns, picture.heading)
+        _save(path, picture)
     if as_json:
         print_json({"written": str(path)})
     else:
         print_line(f"Wrote {path}")
+
+
+def _require(path: Path, what: str) -> None:
+    """Refuse what no viewer can show, or what cannot be written without a library, before the work is done."""
+    if path.suffix in VIEWERS and what not in OVER_TIME:
+        hint = "Give it a name that ends in .svg."
+        raise UsageError(f"one of {', '.join(OVER_TIME)} for a {path.suffix} file", what, hint)
+    if path.suffix == ".mcap":
+        from probdmp.plotting.foxglove import require_foxglove
+
+        require_foxglove()
+    elif path.suffix == ".rrd":
+        from probdmp.plotting.rerun import require_rerun
+
+        require_rerun()
+    else:
+        from probdmp.plotting.style import require_matplotlib
+
+        require_matplotlib()
+
+
+def _save(path: Path, picture: Picture) -> None:
+    if path.suffix not in VIEWERS:
+        from probdmp.plotting.panels import save_panels
+
+        save_panels(path, picture.panels, picture.columns, picture.heading)
+        return
+    assert picture.timelines is not None, "checked"
+    timelines = replace(picture.timelines, heading=picture.heading)
+    if path.suffix == ".mcap":
+        from probdmp.plotting.foxglove import write_mcap
+
+        write_mcap(path, timelines)
+    else:
+        from probdmp.plotting.rerun import write_rrd
+
+        write_rrd(path, timelines)
 
 
 def _check_fits(what: str, execution: Path | None, given: Mapping[str, object]) -> None:

@@ -12,7 +12,13 @@ from probdmp.cli.output import print_table
 __all__ = ["print_system", "system_summary"]
 
 REQUIRED = ("numpy", "scipy", "safetensors", "typer", "rich")
-EXTRAS = {"plot": ("matplotlib",), "fleet": ("pyarrow", "dask", "distributed")}
+EXTRAS = {
+    "plot": ("matplotlib",),
+    "fleet": ("pyarrow", "dask", "distributed"),
+    "sklearn": ("scikit-learn",),
+    "foxglove": ("foxglove-sdk",),
+    "rerun": ("rerun-sdk",),
+}
 """By extra: the packages that it brings."""
 RECORDINGS = "PROBDMP_RECORDINGS"
 KERNELS = {

@@ -6,7 +6,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from probdmp.checks import check_choice
+from probdmp.checks import FloatArray, check_choice
 from probdmp.demonstrations import Demonstration, Recordings, as_demonstrations
 from probdmp.detection.batch import BatchJudgement
 from probdmp.detection.calibrated_monitor import CalibratedMonitor
@@ -24,13 +24,14 @@ from probdmp.dmp import Primitive, Task, stack_tasks, unstack_tasks
 from probdmp.errors import InputError, InputTypeError, NotFittedError
 from probdmp.execution import ExecutionBatch, Observed, Sensor, SensorArray, check_tasks
 from probdmp.execution.plain_sensors import sensors_as_plain, sensors_from_plain
+from probdmp.parameters import HasParameters
 
 __all__ = ["FailureDetector"]
 
 RULES = ("calibrated", "paper")
 
 
-class FailureDetector:
+class FailureDetector(HasParameters):
     """Decides, while a movement runs or over its recording, whether it is still the movement that was taught.
 
     Parameters
@@ -52,7 +53,11 @@ class FailureDetector:
     ----------
     primitives_ : the primitives by label.
     sensors_ : what observes executions; None: positions and learned channels.
+    offset_ : -1, what `score_samples` has to fall below: minus the test ratio of an alarm.
     """
+
+    _kind_of_estimator = "outlier_detector"
+    offset_ = -1.0
 
     def __init__(
         self,
@@ -180,6 +185,21 @@ class FailureDetector:
     ) -> NDArray[np.int64]:
         """(N,) array: +1 for a fine execution, -1 for a failed one; arguments as in `verdicts`."""
         return np.array([-1 if verdict.failed else 1 for verdict in self.verdicts(executions, dt, tasks)], dtype=np.int64)
+
+    def score_samples(self, executions: Recordings, dt: float | None = None, tasks: Sequence[Task] | None = None) -> FloatArray:
+        """(N,) array: minus the test ratio of each verdict, so that higher is more normal; arguments as in `verdicts`.
+
+        The ratio is that of the first alarm, or the largest without one. Where it was above 1, but not for long enough to
+        be an alarm (`persistence`), it counts as 1.
+        """
+        verdicts = self.verdicts(executions, dt, tasks)
+        return np.array([-(v.test_ratio if v.failed else min(v.test_ratio, 1.0)) for v in verdicts], dtype=np.float64)
+
+    def decision_function(
+        self, executions: Recordings, dt: float | None = None, tasks: Sequence[Task] | None = None
+    ) -> FloatArray:
+        """(N,) array: `score_samples` less `offset_`, negative for a failed execution; arguments as in `verdicts`."""
+        return self.score_samples(executions, dt, tasks) - self.offset_
 
     def state(self) -> dict[str, Any]:
         """What a model file keeps, as plain values."""

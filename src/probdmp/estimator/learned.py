@@ -9,15 +9,17 @@ from probdmp.checks import check_seconds
 from probdmp.demonstrations import Demonstration, Recording, as_demonstrations
 from probdmp.dmp import Primitive
 from probdmp.errors import NotFittedError
-from probdmp.estimator.parameters import HasParameters
 from probdmp.execution import Sensor, SensorArray, recording_of_readings
 from probdmp.learning import FitReport
+from probdmp.parameters import HasParameters
 
 __all__ = ["HasPrimitive"]
 
 
 class HasPrimitive(HasParameters):
     """An estimator of one movement."""
+
+    _kind_of_estimator = "density_estimator"
 
     primitive_: Primitive
     fit_report_: FitReport | None

@@ -13,7 +13,7 @@ from probdmp.demonstrations import Demonstration, Recording, Recordings, as_demo
 from probdmp.detection import FailureDetector
 from probdmp.dmp import PUBLISHED, Configuration, Task, ViaPoint, condition_primitive, task_for
 from probdmp.errors import InputTypeError
-from probdmp.estimator.learned import HasPrimitive
+from probdmp.estimator.familiar import HasFamiliarVerbs
 from probdmp.estimator.saving import write_learned
 from probdmp.execution import (
     GaussianTrajectory,
@@ -41,7 +41,7 @@ __all__ = ["ProbabilisticDMP"]
 MOST_SAMPLES = 10_000
 
 
-class ProbabilisticDMP(HasPrimitive):
+class ProbabilisticDMP(HasFamiliarVerbs):
     """A probabilistic Dynamic Movement Primitive: learn a movement, roll it out, execute it with feedback, judge it.
 
     Parameters
@@ -252,6 +252,10 @@ class ProbabilisticDMP(HasPrimitive):
         recordings = as_demonstrations(executions, self._step(dt))
         asked = tasks if tasks is not None else [task_of_recording(primitive, recording) for recording in recordings]
         return score_recordings(primitive, asked, recordings, self._array(sensors))
+
+    def score(self, executions: Recordings, dt: float | None = None, tasks: Sequence[Task] | None = None) -> float:
+        """Mean of `score_samples`, nats per execution: what a search of scikit-learn maximises."""
+        return float(np.mean(self.score_samples(executions, dt, tasks)))
 
     def sample(
         self,
