@@ -42,8 +42,9 @@ __all__ = [
     "channels_for",
 ]
 
-SIDE_BY_SIDE = 256
-"""Executions that are judged side by side: so many that calls do not count, so few that their numbers stay at hand."""
+SIDE_BY_SIDE = 520
+"""Executions that are judged side by side: so many that calls do not count, so few that their numbers stay at hand. Not a power
+of two, or the numbers of one window would all compete for the same few places of the cache."""
 
 
 class Judge(Protocol):
