@@ -10,12 +10,14 @@ from probdmp.io.npz import read_npz, write_npz
 from probdmp.io.parquet import read_parquet, write_parquet
 from probdmp.io.parquet_executions import Executions, ParquetExecutions, Span
 from probdmp.io.parquet_table import ExecutionTable
+from probdmp.io.selection import Selection
 
 __all__ = [
     "ExecutionTable",
     "Executions",
     "ModelContents",
     "ParquetExecutions",
+    "Selection",
     "Span",
     "decode_model",
     "encode_model",

@@ -1,6 +1,7 @@
 """Demonstrations in a Parquet file; its layout is described in `parquet_layout`."""
 
 import io
+import itertools
 import json
 import os
 import warnings
@@ -9,37 +10,32 @@ from typing import Any
 
 import numpy as np
 
+from probdmp.checks import FloatArray
 from probdmp.demonstrations import Demonstration
 from probdmp.errors import DataFileError, InputError, RecordingWarning
 from probdmp.io.archive import LARGEST_ARCHIVE
 from probdmp.io.atomic import write_atomically
+from probdmp.io.constant_rate import TimedTable, at_constant_rate
 from probdmp.io.parquet_executions import Executions, ParquetExecutions, Span
 from probdmp.io.parquet_layout import DURATION, ID, LABEL, POSITIONS, STEP, TIME, UNIT, require_pyarrow
 from probdmp.io.parquet_table import ExecutionTable
 from probdmp.io.recordings import Recordings, check_alike, demonstrations_of, positions_by_name
+from probdmp.io.selection import EVERYTHING, Selection
 
 __all__ = ["read_parquet", "write_parquet"]
 
 NUMBER_BYTES = 8
 
 
-def read_parquet(
-    path: str | os.PathLike[str], label: str | None = None, columns: Sequence[str] | None = None, dt: float | None = None
-) -> list[Demonstration]:
+def read_parquet(path: str | os.PathLike[str], selection: Selection = EVERYTHING) -> list[Demonstration]:
     """Demonstrations from a Parquet file, all of it; `probdmp.fleet` reads files that are larger than memory.
-
-    Parameters
-    ----------
-    label : keep only the demonstrations of this primitive; those without any get it.
-    columns : names of the columns that are positions, in the order wanted; unless given, those that the file says.
-    dt : not to be given; for formats that do not keep one.
 
     Raises
     ------
     DataFileError
         If the file is damaged, too large, not what it claims, or an execution in it cannot be used.
     InputError, InputTypeError
-        If no demonstration has the label, the file has not the columns, or a dt is given.
+        If no demonstration has the label, the file has not the columns.
     MissingExtraError
         If pyarrow is not installed.
 
@@ -48,27 +44,48 @@ def read_parquet(
     RecordingWarning
         If samples that were left out of an even clock had to be put in.
     """
-    if dt is not None:
-        hint = "A Parquet file has its own, which is not to be overruled."
-        raise InputError(f"no dt for {os.fspath(path)}", f"{dt!r}", hint)
     file = ParquetExecutions(path)
     tables, executions = _read_all(file)
-    steps = {float(step) for table in tables for step in table.steps}
-    if len(steps) > 1:
-        hint = "Write executions with other rates to other files, or resample them first."
-        raise DataFileError(f"one rate for all executions in {file.path}", f"dt of {sorted(steps)!r:.100}", hint)
     data = [np.column_stack([table.columns[name] for name in file.layout.columns]) for table in tables]
     lengths = np.concatenate([np.diff(table.offsets) for table in tables])
+    labels = [executions.labels[code] or "" if code >= 0 else "" for code in executions.codes.tolist()]
+    steps = np.concatenate([table.steps for table in tables])
+    step, samples = _at_one_rate(np.split(np.concatenate(data), np.cumsum(lengths)[:-1]), steps, selection.dt, file.path)
     recordings = Recordings(
-        data=np.concatenate(data),
-        offsets=[0, *np.cumsum(lengths).tolist()],
-        labels=[executions.labels[code] or "" if code >= 0 else "" for code in executions.codes.tolist()],
-        dt=steps.pop(),
+        data=np.concatenate(samples),
+        offsets=[0, *itertools.accumulate(map(len, samples))],
+        labels=labels,
+        dt=step,
         columns=list(file.layout.columns),
         units=[file.layout.units.get(name, "") for name in file.layout.columns],
         positions=list(file.layout.positions),
     )
-    return demonstrations_of(recordings, label, columns, file.path)
+    return demonstrations_of(recordings, selection, file.path)
+
+
+def _at_one_rate(
+    samples: Sequence[FloatArray], steps: FloatArray, dt: float | None, name: str
+) -> tuple[float, Sequence[FloatArray]]:
+    """Seconds between samples, and the tables of executions at that rate.
+
+    Parameters
+    ----------
+    samples : (N) arrays (T_i, C).
+    steps : (N,) array, seconds between the samples of each.
+    dt : seconds, the rate that was asked for, if any.
+    """
+    different = sorted(set(steps.tolist()))
+    if dt is None:
+        if len(different) > 1:
+            hint = "Resample them to one: dt=0.01, --dt 0.01 on the command line."
+            raise DataFileError(f"one rate for all executions in {name}", f"dt of {different!r:.100}", hint)
+        return different[0], samples
+    pairs = zip(samples, steps.tolist(), strict=True)
+    timed = [
+        TimedTable(step * np.arange(len(table), dtype=np.float64), table, f"in execution {i}, from 0")
+        for i, (table, step) in enumerate(pairs)
+    ]
+    return dt, [at_constant_rate([own], dt, name)[1][0] for own in timed]
 
 
 def _read_all(file: ParquetExecutions) -> tuple[list[ExecutionTable], Executions]:
