@@ -40,7 +40,7 @@ __all__ = [
 ]
 
 POINT = "X,Y,…"
-READ = ".npz, .csv, .parquet"
+READ = ".npz, .csv, .parquet, .mat"
 """What recordings are read from, as in `io.formats`, which takes long to load."""
 WRITTEN = ".npz, .csv, .parquet"
 """What they are written to."""

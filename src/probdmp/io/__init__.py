@@ -4,6 +4,7 @@ from probdmp.io.atomic import write_atomically
 from probdmp.io.csv import read_csv, write_csv
 from probdmp.io.formats import read_demonstrations, write_demonstrations
 from probdmp.io.json_document import read_json
+from probdmp.io.mat import read_mat
 from probdmp.io.model_contents import ModelContents
 from probdmp.io.model_file import decode_model, encode_model, read_model, write_model
 from probdmp.io.npz import read_npz, write_npz
@@ -24,6 +25,7 @@ __all__ = [
     "read_csv",
     "read_demonstrations",
     "read_json",
+    "read_mat",
     "read_model",
     "read_npz",
     "read_parquet",

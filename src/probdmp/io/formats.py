@@ -8,6 +8,7 @@ from typing import NamedTuple
 from probdmp.demonstrations import Demonstration, trim_still_ends
 from probdmp.errors import InputError
 from probdmp.io.csv import read_csv, write_csv
+from probdmp.io.mat import read_mat
 from probdmp.io.npz import read_npz, write_npz
 from probdmp.io.parquet import read_parquet, write_parquet
 from probdmp.io.selection import Selection
@@ -31,6 +32,7 @@ FORMATS: Mapping[str, Format] = {
     ".npz": Format("NumPy", read_npz, write_npz),
     ".csv": Format("CSV", read_csv, write_csv),
     ".parquet": Format("Parquet", read_parquet, write_parquet, extra="fleet"),
+    ".mat": Format("MATLAB", read_mat),
 }
 """By suffix."""
 
