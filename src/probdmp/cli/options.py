@@ -40,9 +40,9 @@ __all__ = [
 ]
 
 POINT = "X,Y,…"
-READ = ".npz, .csv, .parquet, .mat"
+READ = ".npz, .csv, .parquet, .mat, .bag, .db3, .mcap, or a folder with metadata.yaml"
 """What recordings are read from, as in `io.formats`, which takes long to load."""
-WRITTEN = ".npz, .csv, .parquet"
+WRITTEN = ".npz, .csv, .parquet, .mcap"
 """What they are written to."""
 
 ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="Model file made by probdmp fit.", show_default=False)]

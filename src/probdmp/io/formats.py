@@ -9,8 +9,11 @@ from probdmp.demonstrations import Demonstration, trim_still_ends
 from probdmp.errors import InputError
 from probdmp.io.csv import read_csv, write_csv
 from probdmp.io.mat import read_mat
+from probdmp.io.mcap_reading import read_mcap
+from probdmp.io.mcap_writing import write_mcap
 from probdmp.io.npz import read_npz, write_npz
 from probdmp.io.parquet import read_parquet, write_parquet
+from probdmp.io.rosbag import METADATA, read_rosbag
 from probdmp.io.selection import Selection
 
 __all__ = ["FOLDERS", "FORMATS", "Format", "read_demonstrations", "write_demonstrations"]
@@ -33,10 +36,15 @@ FORMATS: Mapping[str, Format] = {
     ".csv": Format("CSV", read_csv, write_csv),
     ".parquet": Format("Parquet", read_parquet, write_parquet, extra="fleet"),
     ".mat": Format("MATLAB", read_mat),
+    ".bag": Format("ROS 1", read_rosbag, has_topics=True, extra="ros"),
+    ".db3": Format("ROS 2", read_rosbag, has_topics=True, extra="ros"),
+    ".mcap": Format("MCAP", read_mcap, write_mcap, has_topics=True, extra="ros"),
 }
 """By suffix."""
 
-FOLDERS: Mapping[str, Format] = {}
+FOLDERS: Mapping[str, Format] = {
+    METADATA: Format("ROS 2", read_rosbag, has_topics=True, extra="ros"),
+}
 """Of folders: by the file in them that says what they are."""
 
 
