@@ -40,7 +40,7 @@ __all__ = [
 ]
 
 POINT = "X,Y,…"
-READ = ".npz, .csv, .parquet, .mat, .bag, .db3, .mcap, or a folder with metadata.yaml"
+READ = ".npz, .csv, .parquet, .mat, .bag, .db3, .mcap, or a folder with meta/info.json or metadata.yaml"
 """What recordings are read from, as in `io.formats`, which takes long to load."""
 WRITTEN = ".npz, .csv, .parquet, .mcap"
 """What they are written to."""

@@ -12,7 +12,12 @@ from probdmp.cli.output import print_table
 __all__ = ["print_system", "system_summary"]
 
 REQUIRED = ("numpy", "scipy", "safetensors", "typer", "rich")
-EXTRAS = {"plot": ("matplotlib",), "fleet": ("pyarrow", "dask", "distributed"), "ros": ("rosbags", "mcap")}
+EXTRAS = {
+    "plot": ("matplotlib",),
+    "fleet": ("pyarrow", "dask", "distributed"),
+    "lerobot": ("pyarrow",),
+    "ros": ("rosbags", "mcap"),
+}
 """By extra: the packages that it brings."""
 RECORDINGS = "PROBDMP_RECORDINGS"
 KERNELS = {

@@ -4,6 +4,7 @@ from probdmp.io.atomic import write_atomically
 from probdmp.io.csv import read_csv, write_csv
 from probdmp.io.formats import read_demonstrations, write_demonstrations
 from probdmp.io.json_document import read_json
+from probdmp.io.lerobot import read_lerobot
 from probdmp.io.mat import read_mat
 from probdmp.io.mcap_reading import read_mcap
 from probdmp.io.mcap_writing import write_mcap
@@ -28,6 +29,7 @@ __all__ = [
     "read_csv",
     "read_demonstrations",
     "read_json",
+    "read_lerobot",
     "read_mat",
     "read_mcap",
     "read_model",

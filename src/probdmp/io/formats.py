@@ -8,6 +8,7 @@ from typing import NamedTuple
 from probdmp.demonstrations import Demonstration, trim_still_ends
 from probdmp.errors import InputError
 from probdmp.io.csv import read_csv, write_csv
+from probdmp.io.lerobot import INFO, read_lerobot
 from probdmp.io.mat import read_mat
 from probdmp.io.mcap_reading import read_mcap
 from probdmp.io.mcap_writing import write_mcap
@@ -43,6 +44,7 @@ FORMATS: Mapping[str, Format] = {
 """By suffix."""
 
 FOLDERS: Mapping[str, Format] = {
+    INFO: Format("LeRobot", read_lerobot, extra="lerobot"),
     METADATA: Format("ROS 2", read_rosbag, has_topics=True, extra="ros"),
 }
 """Of folders: by the file in them that says what they are."""

@@ -65,10 +65,10 @@ class ParquetLayout(NamedTuple):
     """Which columns are positions, if the file says so."""
 
 
-def require_pyarrow() -> None:
+def require_pyarrow(what: str = "Parquet files", extra: str = "fleet") -> None:
     """Refuse, with the command to type, where pyarrow is not installed."""
     if find_spec("pyarrow") is None:
-        raise MissingExtraError("pyarrow for Parquet files", "none installed", "Type: pip install 'probdmp[fleet]'")
+        raise MissingExtraError(f"pyarrow for {what}", "none installed", f"Type: pip install 'probdmp[{extra}]'")
 
 
 def open_parquet(path: str | os.PathLike[str], **options: Any) -> Any:
