@@ -84,6 +84,8 @@ def at_constant_rate(
     RecordingWarning
         If samples had to be put in, or were resampled without being asked for.
     """
+    if dt is not None and len(recordings) > 1:  # each from its own rate
+        return dt, [table for recording in recordings for table in at_constant_rate([recording], dt, name)[1]]
     clocks = [recording.clock for recording in recordings]
     own = even_step(clocks)
     wanted = dt or own or typical_step(clocks)

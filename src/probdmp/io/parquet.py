@@ -1,7 +1,6 @@
-"""Demonstrations in a Parquet file; its layout is described in `parquet_layout`."""
+"""Demonstrations in a Parquet file: in the layout that `parquet_layout` describes, or in any table, see `parquet_foreign`."""
 
 import io
-import itertools
 import json
 import os
 import warnings
@@ -10,17 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from probdmp.checks import FloatArray
 from probdmp.demonstrations import Demonstration
 from probdmp.errors import DataFileError, InputError, RecordingWarning
 from probdmp.io.archive import LARGEST_ARCHIVE
 from probdmp.io.atomic import write_atomically
-from probdmp.io.constant_rate import TimedTable, at_constant_rate
 from probdmp.io.parquet_executions import Executions, ParquetExecutions, Span
-from probdmp.io.parquet_layout import DURATION, ID, LABEL, POSITIONS, STEP, TIME, UNIT, require_pyarrow
+from probdmp.io.parquet_foreign import read_foreign
+from probdmp.io.parquet_layout import DURATION, ID, LABEL, POSITIONS, STEP, TIME, UNIT, layout_of, open_parquet, require_pyarrow
 from probdmp.io.parquet_table import ExecutionTable
-from probdmp.io.recordings import Recordings, check_alike, demonstrations_of, positions_by_name
+from probdmp.io.recordings import check_alike, demonstrations_of, positions_by_name
 from probdmp.io.selection import EVERYTHING, Selection
+from probdmp.io.timed_recordings import Table, recordings_of
 
 __all__ = ["read_parquet", "write_parquet"]
 
@@ -44,48 +43,32 @@ def read_parquet(path: str | os.PathLike[str], selection: Selection = EVERYTHING
     RecordingWarning
         If samples that were left out of an even clock had to be put in.
     """
+    name = os.fspath(path)
+    schema = open_parquet(path).schema_arrow
+    if ID not in schema.names or (selection.dt is not None and not layout_of(schema, name).is_dense):
+        return demonstrations_of(read_foreign(path, selection), selection, name)
     file = ParquetExecutions(path)
     tables, executions = _read_all(file)
-    data = [np.column_stack([table.columns[name] for name in file.layout.columns]) for table in tables]
+    data = np.concatenate([np.column_stack([table.columns[name] for name in file.layout.columns]) for table in tables])
     lengths = np.concatenate([np.diff(table.offsets) for table in tables])
+    steps = np.concatenate([table.steps for table in tables]).tolist()
     labels = [executions.labels[code] or "" if code >= 0 else "" for code in executions.codes.tolist()]
-    steps = np.concatenate([table.steps for table in tables])
-    step, samples = _at_one_rate(np.split(np.concatenate(data), np.cumsum(lengths)[:-1]), steps, selection.dt, file.path)
-    recordings = Recordings(
-        data=np.concatenate(samples),
-        offsets=[0, *itertools.accumulate(map(len, samples))],
-        labels=labels,
-        dt=step,
-        columns=list(file.layout.columns),
-        units=[file.layout.units.get(name, "") for name in file.layout.columns],
-        positions=list(file.layout.positions),
-    )
-    return demonstrations_of(recordings, selection, file.path)
-
-
-def _at_one_rate(
-    samples: Sequence[FloatArray], steps: FloatArray, dt: float | None, name: str
-) -> tuple[float, Sequence[FloatArray]]:
-    """Seconds between samples, and the tables of executions at that rate.
-
-    Parameters
-    ----------
-    samples : (N) arrays (T_i, C).
-    steps : (N,) array, seconds between the samples of each.
-    dt : seconds, the rate that was asked for, if any.
-    """
-    different = sorted(set(steps.tolist()))
-    if dt is None:
-        if len(different) > 1:
-            hint = "Resample them to one: dt=0.01, --dt 0.01 on the command line."
-            raise DataFileError(f"one rate for all executions in {name}", f"dt of {different!r:.100}", hint)
-        return different[0], samples
-    pairs = zip(samples, steps.tolist(), strict=True)
-    timed = [
-        TimedTable(step * np.arange(len(table), dtype=np.float64), table, f"in execution {i}, from 0")
-        for i, (table, step) in enumerate(pairs)
+    if selection.dt is None and len(set(steps)) > 1:
+        hint = "Resample them to one: dt=0.01, --dt 0.01 on the command line."
+        raise DataFileError(f"one rate for all executions in {name}", f"dt of {sorted(set(steps))!r:.100}", hint)
+    samples = np.split(data, np.cumsum(lengths)[:-1])
+    own = [
+        Table(
+            dict(zip(file.layout.columns, values.T, strict=True)),
+            step * np.arange(len(values), dtype=np.float64),
+            label,
+            f"in execution {i + 1}",
+            file.layout.units,
+        )
+        for i, (values, step, label) in enumerate(zip(samples, steps, labels, strict=True))
     ]
-    return dt, [at_constant_rate([own], dt, name)[1][0] for own in timed]
+    recordings = recordings_of(own, file.layout.positions, {}, selection.dt or steps[0], name)
+    return demonstrations_of(recordings, selection, name)
 
 
 def _read_all(file: ParquetExecutions) -> tuple[list[ExecutionTable], Executions]:
