@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from mcap.writer import Writer as McapWriter
 from rosbags.rosbag1 import Writer as Writer1
-from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -46,10 +46,13 @@ def grip(store, time, width):
     return store.types[CUSTOM](header(store, time), width, np.array([width, -width], dtype=np.float32), force)
 
 
-def write_bag(path: Path, messages, store=ROS_2, storage=StoragePlugin.SQLITE3):
+def write_bag(path: Path, messages, store=ROS_2, storage=StoragePlugin.SQLITE3, compression=CompressionMode.NONE):
     """Messages as (topic, nanoseconds of the log, message)."""
     ros1 = store is ROS_1
-    with Writer1(path) if ros1 else Writer2(path, version=9, storage_plugin=storage) as writer:
+    opened = Writer1(path) if ros1 else Writer2(path, version=9, storage_plugin=storage)
+    if isinstance(opened, Writer2) and compression != CompressionMode.NONE:
+        opened.set_compression(compression, CompressionFormat.ZSTD)
+    with opened as writer:
         connections = {}
         for topic, time, message in messages:
             kind = message.__msgtype__

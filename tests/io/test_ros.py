@@ -1,18 +1,25 @@
 """Recordings of robots: ROS 1, ROS 2 and MCAP, written by rosbags and mcap, say what was recorded, or why they cannot."""
 
+import bz2
 import os
+import struct
+import tracemalloc
 import warnings
 from contextlib import suppress
 from types import SimpleNamespace
 
+import lz4.frame
 import numpy as np
 import pytest
+import zstandard
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from io_strategies import assert_same_demonstrations
+from mcap.writer import IndexType
 from mcap.writer import Writer as McapWriter
 from ros_files import BEGIN, JOINTS, ROS_1, ROS_2, grip, joint_state, pose_stamped, write_bag, write_json
-from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag2 import CompressionMode, StoragePlugin
 
 from probdmp import read_demonstrations, write_demonstrations
 from probdmp.demonstrations import Demonstration
@@ -280,6 +287,89 @@ def test_pipes_are_not_waited_for(tmp_path):
     os.mkfifo(bag / "bag.db3")
     with pytest.raises(DataFileError, match="a pipe, socket or device"):
         read_demonstrations(bag)
+
+
+BIG = 2**27
+"""Bytes that a bomb unpacks to: zeros."""
+
+
+def compressed(kind):
+    payload = bytes(2**22)
+    if kind == "bz2":
+        packer = bz2.BZ2Compressor(1)
+        return b"".join([*(packer.compress(payload) for _ in range(BIG // 2**22)), packer.flush()])
+    if kind == "lz4":
+        packer = lz4.frame.LZ4FrameCompressor()
+        parts = [packer.begin(), *(packer.compress(payload) for _ in range(BIG // 2**22)), packer.flush()]
+        return b"".join(parts)
+    packer = zstandard.ZstdCompressor().compressobj()
+    return b"".join([*(packer.compress(payload) for _ in range(BIG // 2**22)), packer.flush()])
+
+
+@pytest.mark.parametrize("kind", ["lz4", "zstd"])
+@pytest.mark.parametrize("chunked", [True, False], ids=["indexed", "not indexed"])
+def test_bombs_in_mcap_are_refused_unexploded(tmp_path, kind, chunked):
+    """A chunk of which the record says that it is small."""
+    with open(tmp_path / "f.mcap", "wb") as file:
+        writer = McapWriter(file, index_types=IndexType.ALL if chunked else IndexType.NONE)
+        writer.start("ros2")
+        channel = writer.register_channel("/arm", "json", 0)
+        writer.add_message(channel, BEGIN, b"{}", BEGIN)
+        writer.finish()
+    whole, data = (tmp_path / "f.mcap").read_bytes(), compressed(kind)
+    start = whole.index(struct.pack("<I", 4) + b"zstd") - 9 - 28
+    (length,) = struct.unpack_from("<Q", whole, start + 1)
+    record = struct.pack("<3QII", BEGIN, BEGIN, 100, 0, len(kind)) + kind.encode() + struct.pack("<Q", len(data)) + data
+    bomb = struct.pack("<BQ", 6, len(record)) + record
+    tail = whole[start + 9 + length :]
+    summary_start, offsets_start, _ = struct.unpack_from("<QQI", tail, len(tail) - 28)
+    moved = len(bomb) - 9 - length
+    footer = struct.pack("<QQI", summary_start + moved, offsets_start + moved, 0)
+    (tmp_path / "f.mcap").write_bytes(whole[:start] + bomb + tail[:-28] + footer + tail[-8:])
+    refused_cheaply(tmp_path / "f.mcap", "chunks of at most")
+    (tmp_path / "folder").mkdir()
+    bag = write_bag(tmp_path / "bag", arm(ROS_2), storage=StoragePlugin.MCAP)
+    (tmp_path / "f.mcap").rename(bag / "bag.mcap")
+    refused_cheaply(bag, "chunks of at most")
+
+
+@pytest.mark.parametrize("kind", ["bz2", "lz4"])
+def test_bombs_in_ros_1_are_refused_unexploded(tmp_path, kind):
+    bomb, path = compressed(kind), tmp_path / "f.bag"
+    writer = Writer1(path)
+    writer.set_compression(Writer1.CompressionFormat[kind.upper()])
+    writer.compressor = lambda data: bomb
+    with writer:
+        connection = writer.add_connection("/joint_states", "sensor_msgs/msg/JointState", typestore=ROS_1)
+        for t in TIMES:
+            raw = ROS_1.serialize_ros1(joint_state(ROS_1, t, [1.0, 2.0]), "sensor_msgs/msg/JointState")
+            writer.write(connection, t, raw)
+    refused_cheaply(path, "chunks of at most")
+
+
+def refused_cheaply(path, match):
+    tracemalloc.start()
+    try:
+        with pytest.MonkeyPatch.context() as patch, pytest.raises(DataFileError, match=match):
+            patch.setattr("probdmp.io.ros_chunks.LARGEST_CHUNK", 2**24)
+            read_demonstrations(path)
+        assert tracemalloc.get_traced_memory()[1] < BIG / 2
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize("mode", [CompressionMode.FILE, CompressionMode.MESSAGE])
+def test_compressed_recordings(tmp_path, mode):
+    path = write_bag(tmp_path / "bag", arm(ROS_2), compression=mode)
+    if mode == CompressionMode.MESSAGE:
+        with pytest.raises(DataFileError, match="compressed one by one"):
+            read_demonstrations(path)
+        return
+    np.testing.assert_array_equal(read_demonstrations(path)[0].positions, PATH[:, :2])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("probdmp.io.ros_chunks.LARGEST_FILE", 1000)
+        with pytest.raises(DataFileError, match="at most 1000 bytes unpacked"):
+            read_demonstrations(path)
 
 
 def test_a_recording_that_was_not_closed_says_so(tmp_path):

@@ -13,7 +13,8 @@ from probdmp.demonstrations import Demonstration
 from probdmp.errors import DataFileError
 from probdmp.io.mcap_about import about_of
 from probdmp.io.regular_file import open_regular
-from probdmp.io.ros_library import RECOVER, require_ros, undamaged
+from probdmp.io.ros_chunks import LARGEST_CHUNK, check_mcap_chunks
+from probdmp.io.ros_library import require_ros, undamaged
 from probdmp.io.ros_messages import Sample, sample_of
 from probdmp.io.ros_samples import demonstration_of_messages
 from probdmp.io.ros_topics import Topic, choose_topic
@@ -22,8 +23,6 @@ from probdmp.io.selection import EVERYTHING, Selection
 __all__ = ["read_mcap"]
 
 LARGEST_MCAP = 2**40
-LARGEST_CHUNK = 2**28
-"""Bytes, also unpacked; recorders write chunks of some megabytes."""
 TYPES = {("cdr", "ros2msg"), ("cdr", "ros2idl"), ("ros1", "ros1msg")}
 """Encodings of messages and of their types that are understood, besides JSON."""
 
@@ -50,9 +49,9 @@ def read_mcap(path: str | os.PathLike[str], selection: Selection = EVERYTHING) -
     with open_regular(path, LARGEST_MCAP, DataFileError, follow_links=True) as file, undamaged(name):
         from mcap.reader import SeekingReader
 
+        check_mcap_chunks(file, name)
         reader = SeekingReader(file, validate_crcs=True, record_size_limit=LARGEST_CHUNK)
         summary = reader.get_summary()
-        _check_summary(summary, name)
         topic = choose_topic(_topics(summary), selection.topic, name)
         place = f"on {topic.name} in {name}"
         about = about_of(reader.iter_metadata(), topic.name)
@@ -61,15 +60,6 @@ def read_mcap(path: str | os.PathLike[str], selection: Selection = EVERYTHING) -
             return demonstration_of_messages(samples, selection, place, name)
         own = ((logged, about.sample(sample)) for logged, sample in samples)
         return demonstration_of_messages(own, selection, place, name, about)
-
-
-def _check_summary(summary: Any, name: str) -> None:
-    if summary is None or summary.statistics is None:
-        raise DataFileError(f"a recording that was closed in {name}", "one without a summary of its messages", RECOVER)
-    for chunk in summary.chunk_indexes:
-        if max(chunk.uncompressed_size, chunk.compressed_size) > LARGEST_CHUNK:
-            got = f"one of {chunk.uncompressed_size}"
-            raise DataFileError(f"chunks of at most {LARGEST_CHUNK} bytes in {name}", got, "Record with smaller chunks.")
 
 
 def _topics(summary: Any) -> list[Topic]:

@@ -13,6 +13,7 @@ from typing import Any
 from probdmp.demonstrations import Demonstration
 from probdmp.errors import DataFileError
 from probdmp.io.regular_file import open_regular
+from probdmp.io.ros_chunks import bound_ros1_chunks, check_compressed_file, check_mcap_chunks
 from probdmp.io.ros_library import require_ros, undamaged
 from probdmp.io.ros_messages import Sample, sample_of
 from probdmp.io.ros_samples import demonstration_of_messages
@@ -46,12 +47,13 @@ def read_rosbag(path: str | os.PathLike[str], selection: Selection = EVERYTHING)
     """
     require_ros()
     name = os.fspath(path)
-    _check_files(Path(path))
     with undamaged(name):
+        _check_files(Path(path))
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
 
         with AnyReader([Path(path)], default_typestore=get_typestore(Stores.LATEST)) as bag:
+            _check_compression(bag, name)
             topic = choose_topic(_topics(bag.connections), selection.topic, name)
             place = f"on {topic.name} in {name}"
             wanted = [c for c in bag.connections if (c.topic, c.msgtype) == (topic.name, topic.kind)]
@@ -81,3 +83,16 @@ def _check_files(path: Path) -> None:
     for inner in path.iterdir():
         if not (stat.S_ISREG(inner.stat().st_mode) or inner.is_dir()):
             raise DataFileError(f"regular files in {os.fspath(path)!r}", f"a pipe, socket or device: {inner.name!r}")
+        if inner.suffix == ".zstd":
+            check_compressed_file(inner)
+        elif inner.suffix == ".mcap":
+            with open(inner, "rb") as file:
+                check_mcap_chunks(file, os.fspath(inner))
+
+
+def _check_compression(bag: Any, name: str) -> None:
+    """Refuse what cannot be bounded."""
+    bound_ros1_chunks(bag.readers, name)
+    if any(getattr(reader, "compression_mode", None) == "message" for reader in bag.readers):
+        hint = "Unpack it: `ros2 bag convert`, or record it with --compression-mode file."
+        raise DataFileError(f"a recording whose messages are not compressed one by one in {name}", "one of the kind", hint)
