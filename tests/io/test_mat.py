@@ -128,6 +128,12 @@ def test_what_cannot_be_used_is_refused_by_name(save, variables, match):
         read_mat(save(variables))
 
 
+def test_columns_that_only_some_have_are_left_out_and_said(save):
+    with pytest.warns(RecordingWarning, match="only some demonstrations have, left out: 'F_1', 'F_2'"):
+        demos = read_mat(save({"demos": cell([{"pos": PATH, "t": TIMES}, {"pos": PATH, "t": TIMES, "F": PATH[:, :2]}])}))
+    assert [list(d.channels) for d in demos] == [[], []]
+
+
 def test_missing_samples_stay_missing(save):
     holes = np.where(np.arange(50)[:, None] == 7, np.nan, PATH)
     assert np.isnan(read_mat(save({"pos": holes, "t": TIMES}))[0].positions[7]).all()
@@ -273,7 +279,8 @@ def test_objects_are_left_out_unseen(tmp_path):
     others = [matrix(kind, (1, 1), element(1, b"\xff" * 64), name=b"o") for kind in (3, 5, 16, 17)]
     nested = matrix(1, (1, 1), others[0], name=b"c")
     (tmp_path / "f.mat").write_bytes(HEADER + b"".join(others) + nested + numbers)
-    (demo,) = read_mat(tmp_path / "f.mat", Selection(dt=1.0))
+    with pytest.warns(RecordingWarning, match=r"'o', 'o', 'o', 'o', 'c' left out, which are objects"):
+        (demo,) = read_mat(tmp_path / "f.mat", Selection(dt=1.0))
     np.testing.assert_array_equal(demo.positions, [[0, 4], [1, 5], [2, 6], [3, 7]])
     (tmp_path / "f.mat").write_bytes(HEADER + others[0])
     with pytest.raises(DataFileError, match="objects alone: o"):

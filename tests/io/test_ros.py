@@ -350,9 +350,10 @@ def test_bombs_in_ros_1_are_refused_unexploded(tmp_path, kind):
 def refused_cheaply(path, match):
     tracemalloc.start()
     try:
-        with pytest.MonkeyPatch.context() as patch, pytest.raises(DataFileError, match=match):
+        with pytest.MonkeyPatch.context() as patch:
             patch.setattr("probdmp.io.ros_chunks.LARGEST_CHUNK", 2**24)
-            read_demonstrations(path)
+            with pytest.raises(DataFileError, match=match):
+                read_demonstrations(path)
         assert tracemalloc.get_traced_memory()[1] < BIG / 2
     finally:
         tracemalloc.stop()

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from probdmp.errors import DataFileError
+from probdmp.errors import DataFileError, RecordingWarning
 from probdmp.io.mat_elements import HEADER_BYTES, HINT, LARGEST_MAT, measured_variables
+from probdmp.io.recordings import listing
 from probdmp.io.regular_file import open_regular
 
 __all__ = ["Value", "read_variables"]
@@ -16,6 +17,7 @@ __all__ = ["Value", "read_variables"]
 Value = Any
 """Numbers as array of floats, text as str, a struct as dict, a cell or an array of structs as list; None if complex."""
 
+OBJECTS = "Strings with double quotes, tables and dates are objects: use char(…), table2struct(…) and numbers."
 HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
@@ -26,6 +28,11 @@ def read_variables(path: str | os.PathLike[str]) -> dict[str, Value]:
     ------
     DataFileError
         If it is not an undamaged MATLAB file of version 5 to 7, or holds nothing of the kind.
+
+    Warns
+    -----
+    RecordingWarning
+        If it also has variables that are objects, or hold one.
     """
     name = os.fspath(path)
     with open_regular(path, LARGEST_MAT, DataFileError, follow_links=True) as file:
@@ -35,7 +42,10 @@ def read_variables(path: str | os.PathLike[str]) -> dict[str, Value]:
     variables = {key: _plain(value) for key, value in _loaded(kept, name).items() if not key.startswith("__")}
     if not variables:
         objects = f"objects alone: {', '.join(left_out)}" if left_out else "none"
-        raise DataFileError(f"variables with numbers in {name}", f"{objects:.200}", "Save arrays, cells or structs.")
+        raise DataFileError(f"variables with numbers in {name}", f"{objects:.200}", f"Save arrays, cells or structs. {OBJECTS}")
+    if left_out:
+        text = f"{name}: {listing(map(repr, left_out), 10)} left out, which are objects or hold one. {OBJECTS}"
+        warnings.warn(text, RecordingWarning, stacklevel=2)
     return variables
 
 

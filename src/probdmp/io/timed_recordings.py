@@ -1,6 +1,7 @@
 """Tables of samples, each with a clock of its own, as the content of a file at one rate."""
 
 import itertools
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -8,7 +9,7 @@ import numpy as np
 
 from probdmp.checks import FloatArray
 from probdmp.demonstrations.demonstration import SHORTEST_RECORDING
-from probdmp.errors import DataFileError, InputError
+from probdmp.errors import DataFileError, InputError, RecordingWarning
 from probdmp.io.constant_rate import TimedTable, at_constant_rate
 from probdmp.io.recordings import MOST_COLUMNS, MOST_DEMONSTRATIONS, Recordings, listing
 
@@ -53,6 +54,11 @@ def recordings_of(
         If there are none or too many, or they have no columns in common.
     InputError
         If there are neither times nor dt.
+
+    Warns
+    -----
+    RecordingWarning
+        If some have other columns too, or times are not even.
     """
     if not 1 <= len(tables) <= MOST_DEMONSTRATIONS:
         raise DataFileError(f"1 to {MOST_DEMONSTRATIONS} demonstrations in {name}", str(len(tables)))
@@ -60,6 +66,10 @@ def recordings_of(
     if not columns or len(columns) > MOST_COLUMNS:
         expected = f"1 to {MOST_COLUMNS} columns of numbers that all demonstrations have in {name}"
         raise DataFileError(expected, f"{len(columns)}; the first has {listing(map(repr, tables[0].columns), 10)}")
+    others = dict.fromkeys(column for table in tables for column in table.columns if column not in columns)
+    if others:
+        text = f"{name}: columns that only some demonstrations have, left out: {listing(map(repr, others), 10)}."
+        warnings.warn(text, RecordingWarning, stacklevel=3)
     data = [np.column_stack([table.columns[column] for column in columns]) for table in tables]
     for table, samples in zip(tables, data, strict=True):
         if len(samples) < SHORTEST_RECORDING:
