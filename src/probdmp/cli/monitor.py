@@ -41,7 +41,7 @@ def monitor(
         float | None,
         typer.Option(
             metavar="S",
-            help="Seconds between ticks of JSON lines, by default as learned; or between samples of .csv files without times.",
+            help="Seconds between ticks of JSON lines, by default as learned; in files as --dt of fit.",
         ),
     ] = None,
     on_alarm: Annotated[
