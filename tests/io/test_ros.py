@@ -15,7 +15,7 @@ import zstandard
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from io_strategies import assert_same_demonstrations
-from mcap.writer import IndexType
+from mcap.writer import CompressionType, IndexType
 from mcap.writer import Writer as McapWriter
 from ros_files import BEGIN, JOINTS, ROS_1, ROS_2, grip, joint_state, pose_stamped, write_bag, write_json
 from rosbags.rosbag1 import Writer as Writer1
@@ -165,6 +165,26 @@ def test_json_of_another_program(tmp_path):
         read_demonstrations(write_json(tmp_path / "text.mcap", [(t, {"mode": "auto"}) for t in TIMES]))
     with pytest.raises(DataFileError, match="finite"):
         read_demonstrations(write_json(tmp_path / "inf.mcap", [(t, {"q": float("inf")}) for t in TIMES]))
+
+
+@pytest.mark.parametrize("chunked", [True, False])
+@pytest.mark.parametrize(("store", "encoding"), [(ROS_1, "ros1"), (ROS_2, "cdr")])
+def test_mcap_of_other_writers(tmp_path, store, encoding, chunked):
+    kind = "sensor_msgs/msg/JointState"
+    text, _ = store.generate_msgdef(kind, ros_version=1 if store is ROS_1 else 2)
+    name, schema_encoding = (kind.replace("/msg/", "/"), "ros1msg") if store is ROS_1 else (kind, "ros2msg")
+    with open(tmp_path / "f.mcap", "wb") as file:
+        writer = McapWriter(file, use_chunking=chunked, compression=CompressionType.LZ4)
+        writer.start()
+        channel = writer.register_channel("/arm", encoding, writer.register_schema(name, schema_encoding, text.encode()))
+        for time, p in zip(TIMES, PATH, strict=True):
+            message = joint_state(store, time, p[:2])
+            raw = store.serialize_ros1(message, kind) if store is ROS_1 else store.serialize_cdr(message, kind)
+            writer.add_message(channel, time + LATE, bytes(raw), time)
+        writer.finish()
+    (demo,) = read_demonstrations(tmp_path / "f.mcap")
+    assert (demo.names, demo.dt) == (JOINTS, 0.01)
+    np.testing.assert_array_equal(demo.positions, PATH[:, :2])
 
 
 def test_messages_in_other_encodings_are_refused_by_name(tmp_path):

@@ -10,49 +10,27 @@ Case does not matter but for numbers; text and what is nested deeper is left out
 
 import itertools
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from probdmp.checks import FloatArray, IntArray
+from probdmp.checks import IntArray
 from probdmp.errors import DataFileError
-from probdmp.io import csv_header
 from probdmp.io.archive import LARGEST_ARCHIVE
 from probdmp.io.constant_rate import check_times
-from probdmp.io.csv_header import PER_SECOND, only_of_kind, split_unit
-from probdmp.io.parquet_arrays import codes_of, list_lengths, numbers_of, seconds_of
-from probdmp.io.parquet_layout import (
-    ID,
-    LABEL,
-    UNIT,
-    is_list_of_numbers,
-    is_moment,
-    is_number,
-    is_text,
-    layout_of,
-    open_parquet,
-    positions_told,
-)
-from probdmp.io.recordings import MOST_COLUMNS, Recordings, listing
+from probdmp.io.csv_header import PER_SECOND, split_unit
+from probdmp.io.parquet_arrays import codes_of, seconds_of
+from probdmp.io.parquet_columns import Roles, columns_of, roles_of
+from probdmp.io.parquet_layout import is_moment, open_parquet, positions_told
+from probdmp.io.recordings import MOST_COLUMNS, Recordings
 from probdmp.io.selection import Selection
 from probdmp.io.timed_recordings import Table, recordings_of
 
 __all__ = ["read_foreign"]
 
-CUT = (*csv_header.CUT, ID, "episode_index")
-LABELS = (*csv_header.LABEL, LABEL)
 UNIT_HINT = "Times in milliseconds? Name the column time [ms]; or time [s] if it is seconds."
-
-
-class _Roles(NamedTuple):
-    """Titles of the columns by what they are for."""
-
-    time: str | None
-    cut: str | None
-    label: str | None
-    numbers: tuple[str, ...]
 
 
 def read_foreign(path: str | os.PathLike[str], selection: Selection) -> Recordings:
@@ -68,12 +46,12 @@ def read_foreign(path: str | os.PathLike[str], selection: Selection) -> Recordin
     name = os.fspath(path)
     file = open_parquet(path)
     schema, n_rows = file.schema_arrow, file.metadata.num_rows
-    roles = _roles_of(schema, name)
+    roles = roles_of(schema, name)
     if n_rows * (file.metadata.num_columns + 1) * 8 > LARGEST_ARCHIVE or file.metadata.num_columns > MOST_COLUMNS:
         got = f"{n_rows} rows of {file.metadata.num_columns}"
         raise DataFileError(f"at most {LARGEST_ARCHIVE} bytes of samples in {MOST_COLUMNS} columns in {name}", got)
     rows = _read(file, [title for title in (*roles[:3], *roles.numbers) if title is not None], name)
-    columns, groups, units = _columns(rows, roles.numbers, schema, name)
+    columns, groups, units = columns_of(rows, roles.numbers, schema, name)
     starts, labels = _cut(rows, roles, name)
     clock, per_second = None, 1.0
     if roles.time is not None:
@@ -94,27 +72,6 @@ def _row(start: int, k: int) -> str:
     return f"in row {start + k}"
 
 
-def _roles_of(schema: Any, name: str) -> _Roles:
-    titles = list(schema.names)
-    if len(set(titles)) < len(titles):
-        raise DataFileError(f"different names of columns in {name}", listing(map(repr, titles)))
-    plain = [split_unit(title)[0] for title in titles]
-    places = (only_of_kind(kind, plain, f"in {name}") for kind in (csv_header.TIME, CUT, LABELS))
-    time, cut, label = (None if place is None else titles[place] for place in places)
-    types = {title: schema.field(title).type for title in titles}
-    if time is not None and not (is_number(types[time]) or is_moment(types[time])):
-        raise DataFileError(f"numbers or timestamps in the column {time!r} of {name}", str(types[time]))
-    if time is not None and split_unit(time)[1].lower() not in PER_SECOND:
-        raise DataFileError(f"time in s, ms, us or ns in {name}", repr(time), "Convert it to seconds: time [s].")
-    if label is not None and not is_text(types[label]):
-        label = None  # such as a number of classes: a column like any other
-    told = layout_of(schema, name).told if ID in titles else ()
-    numbers = [
-        t for t in titles if t not in (time, cut, label, *told) and (is_number(types[t]) or is_list_of_numbers(types[t]))
-    ]
-    return _Roles(time, cut, label, tuple(numbers))
-
-
 def _read(file: Any, titles: Sequence[str], name: str) -> Any:
     import pyarrow as pa
 
@@ -125,38 +82,7 @@ def _read(file: Any, titles: Sequence[str], name: str) -> Any:
         raise DataFileError(f"an undamaged Parquet file at {name!r}", reason, "Copy or write it again.") from error
 
 
-def _columns(
-    rows: Any, titles: Sequence[str], schema: Any, name: str
-) -> tuple[dict[str, FloatArray], dict[str, list[str]], dict[str, str]]:
-    """Columns of numbers by name, names of those that come from lists, and units."""
-    columns: dict[str, FloatArray] = {}
-    groups: dict[str, list[str]] = {}
-    units: dict[str, str] = {}
-    for title in titles:
-        plain, unit = split_unit(title)
-        unit = unit or (schema.field(title).metadata or {}).get(UNIT, b"").decode(errors="replace")
-        found = dict(_unpacked(rows[title], plain, name))
-        if not found.keys().isdisjoint(columns):
-            raise DataFileError(f"different names of columns in {name}", listing(map(repr, found)))
-        columns |= found
-        units |= dict.fromkeys(found, unit)
-        groups |= {plain: list(found)} if plain not in found else {}
-    return columns, groups, units
-
-
-def _unpacked(column: Any, plain: str, name: str) -> Iterator[tuple[str, FloatArray]]:
-    if not is_list_of_numbers(column.type):
-        yield plain, numbers_of(column)
-        return
-    lengths = set(list_lengths(column).tolist())
-    if len(lengths) != 1 or lengths == {0} or column.null_count:
-        raise DataFileError(f"lists of one length in the column {plain!r} of {name}", listing(sorted(lengths), 5))
-    width = lengths.pop()
-    for i, values in enumerate(numbers_of(column).reshape(-1, width).T):
-        yield f"{plain}_{i}", values
-
-
-def _cut(rows: Any, roles: _Roles, name: str) -> tuple[IntArray, list[str]]:
+def _cut(rows: Any, roles: Roles, name: str) -> tuple[IntArray, list[str]]:
     """The first row of each demonstration, and its label."""
     keys: list[Any] = [codes_of(rows[title])[0] for title in (roles.cut, roles.label) if title is not None]
     changes = np.zeros(len(rows), dtype=np.bool_)
