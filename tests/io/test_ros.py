@@ -2,10 +2,11 @@
 
 import bz2
 import os
+import sqlite3
 import struct
 import tracemalloc
 import warnings
-from contextlib import suppress
+from contextlib import closing, suppress
 from types import SimpleNamespace
 
 import lz4.frame
@@ -391,6 +392,20 @@ def test_compressed_recordings(tmp_path, mode):
         patch.setattr("probdmp.io.ros_chunks.LARGEST_FILE", 1000)
         with pytest.raises(DataFileError, match="at most 1000 bytes unpacked"):
             read_demonstrations(path)
+
+
+@pytest.mark.parametrize("alone", [True, False])
+def test_a_database_that_would_never_end_is_refused(tmp_path, alone):
+    bag = write_bag(tmp_path / "bag", arm(ROS_2))
+    (file,) = bag.glob("*.db3")
+    counting = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n)"
+    endless = f"{counting} SELECT i AS id, 1 AS topic_id, i AS timestamp, x'00' AS data"
+    with closing(sqlite3.connect(file)) as database:
+        database.execute("DROP TABLE messages")
+        database.execute(f"CREATE VIEW messages AS {endless} FROM n")
+        database.commit()
+    with pytest.raises(DataFileError, match=r"tables alone in .*a view 'messages'"):
+        read_demonstrations(file if alone else bag)
 
 
 def test_a_recording_that_was_not_closed_says_so(tmp_path):

@@ -38,6 +38,7 @@ def check_mcap_chunks(file: BinaryIO, name: str) -> None:
     """
     from mcap.reader import SeekingReader
 
+    file.seek(0)
     summary = SeekingReader(file, record_size_limit=LARGEST_CHUNK).get_summary()
     if summary is None or summary.statistics is None:
         raise DataFileError(f"a recording that was closed in {name}", "one without a summary of its messages", RECOVER)

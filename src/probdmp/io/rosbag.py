@@ -5,7 +5,6 @@ those that the recording itself defines; where it defines none, those of a stand
 """
 
 import os
-import stat
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from probdmp.demonstrations import Demonstration
 from probdmp.errors import DataFileError
 from probdmp.io.regular_file import open_regular
 from probdmp.io.ros_chunks import bound_ros1_chunks, check_compressed_file, check_mcap_chunks
+from probdmp.io.ros_database import check_database
 from probdmp.io.ros_library import require_ros, undamaged
 from probdmp.io.ros_messages import Sample, sample_of
 from probdmp.io.ros_samples import demonstration_of_messages
@@ -23,6 +23,8 @@ from probdmp.io.selection import EVERYTHING, Selection
 __all__ = ["METADATA", "read_rosbag"]
 
 METADATA = "metadata.yaml"
+MCAP, SQLITE, ZSTD = b"\x89MCAP0\r\n", b"SQLite format 3\0", b"\x28\xb5\x2f\xfd"
+"""How such files begin."""
 LARGEST_METADATA = 2**24
 LARGEST_BAG = 2**40
 """Bytes; only the messages of one topic are read."""
@@ -75,19 +77,29 @@ def _topics(connections: Sequence[Any]) -> list[Topic]:
 
 
 def _check_files(path: Path) -> None:
-    """Refuse what is no file, in a folder too: a pipe would be waited for."""
+    """Refuse what is no file, in a folder too: a pipe would be waited for; and what would take for ever to read."""
     if not path.is_dir():
         open_regular(path, LARGEST_BAG, DataFileError, follow_links=True).close()
+        _check_content(path)
         return
     open_regular(path / METADATA, LARGEST_METADATA, DataFileError, follow_links=True).close()
     for inner in path.iterdir():
-        if not (stat.S_ISREG(inner.stat().st_mode) or inner.is_dir()):
-            raise DataFileError(f"regular files in {os.fspath(path)!r}", f"a pipe, socket or device: {inner.name!r}")
-        if inner.suffix == ".zstd":
-            check_compressed_file(inner)
-        elif inner.suffix == ".mcap":
-            with open(inner, "rb") as file:
-                check_mcap_chunks(file, os.fspath(inner))
+        if inner.is_dir():
+            continue
+        open_regular(inner, LARGEST_BAG, DataFileError, follow_links=True).close()
+        _check_content(inner)
+
+
+def _check_content(path: Path) -> None:
+    """Look at a file before rosbags does, whatever its name."""
+    with open(path, "rb") as file:
+        begin = file.read(16)
+        if begin.startswith(MCAP):
+            check_mcap_chunks(file, os.fspath(path))
+    if begin.startswith(SQLITE):
+        check_database(path)
+    elif begin.startswith(ZSTD):
+        check_compressed_file(path)
 
 
 def _check_compression(bag: Any, name: str) -> None:
