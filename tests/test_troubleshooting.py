@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ros_files import ROS_1, joint_state, pose_stamped, write_bag
+from scipy.io import savemat
 from typer.testing import CliRunner
 
 from probdmp import (
@@ -44,6 +46,11 @@ def dmp(**settings: Any) -> ProbabilisticDMP:
 def watched_by_a_function(learned: ProbabilisticDMP) -> FailureDetector:
     sensor = NonlinearSensor("squares", lambda q: q**2, [1.0, 1.0], outputs=("x", "y"))
     return FailureDetector(rule="paper").fit(learned, LETTERS, sensors=[sensor])
+
+
+def both_topics() -> list[tuple[str, int, Any]]:
+    states = [("/joint_states", i, joint_state(ROS_1, i, [1.0, 2.0])) for i in range(3)]
+    return [*states, *(("/tool", i, pose_stamped(ROS_1, i, [1.0, 2.0, 3.0])) for i in range(3))]
 
 
 def detector(learned: ProbabilisticDMP) -> FailureDetector:
@@ -97,6 +104,10 @@ PROVOKED: list[Callable[[], Any]] = [
     lambda: detector(dmp()).predict(LETTERS, tasks=[Task([0.0, 0.0], [1.0, 1.0], 1.0)]),
     lambda: PrimitiveLibrary({"c": dmp()})["d"],
     lambda: read_demonstrations("letters.txt"),
+    lambda: read_demonstrations("letters.csv", topic="/joint_states"),
+    lambda: (Path("new.mat").write_bytes(b"MATLAB 7.3 MAT-file"), read_demonstrations("new.mat")),
+    lambda: (write_bag(Path("two.bag"), both_topics(), ROS_1), read_demonstrations("two.bag")),
+    lambda: (savemat("bare.mat", {"pos": PATH}), read_demonstrations("bare.mat")),
     lambda: read_demonstrations("nowhere.npz"),
     lambda: (Path("broken.npz").write_text("x"), read_demonstrations("broken.npz")),
     lambda: (

@@ -217,9 +217,14 @@ def test_options_that_do_not_fit_the_model_are_usage_errors(arguments, folder, r
     assert run("monitor", folder / "letters.probdmp", *arguments, text=GOOD).exit_code == 2
 
 
-@pytest.mark.parametrize("option", [("--dt", "0.1"), ("--on-alarm", "hold"), ("-",)])
+@pytest.mark.parametrize("option", [("--on-alarm", "hold"), ("--feedback", "none"), ("-",)])
 def test_options_for_json_lines_are_refused_with_a_file(option, folder, run):
     assert run("monitor", folder / "letters.probdmp", folder / "letters.npz", *option).exit_code == 2
+
+
+def test_recordings_are_resampled_to_a_rate_that_is_asked_for(folder, run_json):
+    by_rate = {dt: run_json("track", folder / "c.probdmp", folder / "letters.npz", "--dt", dt)["times"] for dt in (0.02, 0.04)}
+    assert len(by_rate[0.02]) in (2 * len(by_rate[0.04]) - 1, 2 * len(by_rate[0.04]))
 
 
 def test_an_unknown_reaction_is_a_usage_error(folder, run):

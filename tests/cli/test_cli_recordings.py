@@ -91,8 +91,29 @@ def test_files_without_times_need_dt(run, run_json, tmp_path, letters):
     assert run_json("convert", tmp_path / "c.csv", tmp_path / "c.npz", "--dt", 0.02)["dt"] == 0.02
     (read,) = read_demonstrations(tmp_path / "c.npz")
     assert read.fingerprint == letters[0].fingerprint
-    wrong = run("convert", tmp_path / "c.npz", tmp_path / "d.csv", "--dt", 0.02)
-    assert (wrong.exit_code, "has its own" in wrong.stderr) == (2, True)
+    assert run_json("convert", tmp_path / "c.npz", tmp_path / "d.csv", "--dt", 0.04)["dt"] == 0.04
+    (slow,) = read_demonstrations(tmp_path / "d.csv")
+    np.testing.assert_array_equal(slow.positions, letters[0].positions[::2])
+    wrong = run("convert", tmp_path / "c.npz", tmp_path / "e.csv", "--topic", "/joint_states")
+    assert (wrong.exit_code, "no topic for" in wrong.stderr) == (2, True)
+
+
+def test_still_ends_are_cut_when_asked_for(run_json, tmp_path, letters):
+    held = [np.vstack([[d.positions[0]] * 40, d.positions, [d.positions[-1]] * 40]) for d in letters[:6]]
+    write_demonstrations(tmp_path / "held.npz", [replace(d, positions=p) for d, p in zip(letters, held, strict=False)])
+    (whole,) = run_json("convert", tmp_path / "held.npz", tmp_path / "whole.npz")["movements"]
+    (cut,) = run_json("convert", tmp_path / "held.npz", tmp_path / "cut.npz", "--trim")["movements"]
+    assert whole["longest"] == pytest.approx(cut["longest"] + 80 * letters[0].dt, abs=7 * letters[0].dt)
+    (told,) = run_json("fit", tmp_path / "held.npz", "-o", tmp_path / "m.probdmp", "--n-basis", 8, "--trim")["primitives"]
+    assert told["duration"] < whole["shortest"]
+
+
+def test_help_names_the_formats_that_there_are():
+    from probdmp.cli.options import READ, WRITTEN
+    from probdmp.io.formats import FOLDERS, FORMATS
+
+    assert READ.split(", or a folder with ") == [", ".join(FORMATS), *([" or ".join(FOLDERS)] if FOLDERS else [])]
+    assert ", ".join(suffix for suffix, known in FORMATS.items() if known.write) == WRITTEN
 
 
 def test_resampling_is_said_on_standard_error(run, tmp_path):

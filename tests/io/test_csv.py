@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 
 from probdmp.demonstrations import Demonstration
 from probdmp.errors import DataFileError, InputError, InputTypeError, RecordingWarning
-from probdmp.io import read_csv, read_demonstrations, write_csv, write_demonstrations
+from probdmp.io import Selection, read_csv, read_demonstrations, write_csv, write_demonstrations
 from probdmp.io.csv_header import CUT, LABEL, TIME, split_unit
 from probdmp.io.csv_lines import LARGEST_CSV, LONGEST_LINE
 
@@ -105,12 +105,12 @@ def test_columns_names_units_and_channels(write):
     assert (demo.names, demo.units, demo.label, demo.dt) == (("x", "y"), "mm", "", 0.1)
     np.testing.assert_array_equal(demo.positions, [[1, 2], [1.5, np.nan], [2, np.nan]])
     np.testing.assert_array_equal(demo.channels["force"], [0, 0.5, 1])
-    (demo,) = read_csv(write(SMALL), columns=["force"])
+    (demo,) = read_csv(write(SMALL), Selection(columns=["force"]))
     assert (demo.names, demo.units, list(demo.channels)) == (("force",), "", ["x", "y"])
     with pytest.raises(InputError, match=r"different ones of 'x', 'y', 'force' in .*f\.csv, got \['w'\]"):
-        read_csv(write(SMALL), columns=["w"])
+        read_csv(write(SMALL), Selection(columns=["w"]))
     with pytest.raises(InputTypeError, match="columns as a list"):
-        read_csv(write(SMALL), columns="x,y")
+        read_csv(write(SMALL), Selection(columns="x,y"))
 
 
 ROWS = [("0", "1,5", "-2e-3"), ("0,01", "", "NaN"), ("0,02", "2,5", "1")]
@@ -142,9 +142,9 @@ def test_one_long_file(write):
     text = "Trial;label;t;x\n" + "".join(f"{k};{'ab'[k // 2]};{t / 10};{k}\n" for k in range(4) for t in range(3 + k))
     demos = read_csv(write(text))
     assert [(d.label, d.n_samples, d.positions[0, 0]) for d in demos] == [("a", 3, 0), ("a", 4, 1), ("b", 5, 2), ("b", 6, 3)]
-    assert [d.n_samples for d in read_csv(write(text), label="b")] == [5, 6]
+    assert [d.n_samples for d in read_csv(write(text), Selection(label="b"))] == [5, 6]
     with pytest.raises(InputError, match=r"one of those in .*f\.csv: 'a' \(2\), 'b' \(2\), got 'q'"):
-        read_csv(write(text), label="q")
+        read_csv(write(text), Selection(label="q"))
 
 
 def test_without_a_number_a_new_label_begins_a_demonstration(write):
@@ -153,7 +153,7 @@ def test_without_a_number_a_new_label_begins_a_demonstration(write):
 
 
 def test_a_file_without_labels_takes_the_one_asked_for(write):
-    assert read_csv(write(SMALL), label="reach")[0].label == "reach"
+    assert read_csv(write(SMALL), Selection(label="reach"))[0].label == "reach"
 
 
 # Times
@@ -161,12 +161,12 @@ def test_a_file_without_labels_takes_the_one_asked_for(write):
 
 def test_a_file_without_times_needs_dt(write):
     text = "x,y\n1,2\n3,4\n5,6\n"
-    (demo,) = read_csv(write(text), dt=0.01)
+    (demo,) = read_csv(write(text), Selection(dt=0.01))
     assert (demo.dt, demo.n_samples) == (0.01, 3)
     with pytest.raises(InputError, match=r"a column named time or t in .*f\.csv, or dt, got neither\. Say.*--dt 0\.01"):
         read_csv(write(text))
     with pytest.raises(InputError, match="dt > 0 in seconds"):
-        read_csv(write(text), dt=0.0)
+        read_csv(write(text), Selection(dt=0.0))
 
 
 def timed(times, unit=""):
@@ -206,12 +206,12 @@ def test_uneven_times_are_resampled_and_said_so(write):
     np.testing.assert_allclose(demo.positions[:, 0], np.interp(np.arange(6) * 0.01, times, np.arange(6)))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        (demo,) = read_csv(write(timed(times)), dt=0.025)  # asked for
+        (demo,) = read_csv(write(timed(times)), Selection(dt=0.025))  # asked for
     np.testing.assert_allclose(demo.positions[:, 0], np.interp([0, 0.025, 0.05], times, np.arange(6)))
 
 
 def test_dt_resamples_an_even_file_too_and_gaps_stay_gaps(write):
-    (demo,) = read_csv(write("t,x\n0,0\n0.1,\n0.2,2\n0.3,3\n0.4,4\n"), dt=0.05)
+    (demo,) = read_csv(write("t,x\n0,0\n0.1,\n0.2,2\n0.3,3\n0.4,4\n"), Selection(dt=0.05))
     np.testing.assert_allclose(demo.positions[:, 0], [0, np.nan, np.nan, np.nan, 2, 2.5, 3, 3.5, 4])
 
 
@@ -269,8 +269,8 @@ def test_blank_lines_are_passed_over_unless_they_may_be_samples(write):
     (demo,) = read_csv(write("\n\nt,x\n0,1\n\n0.1,2\n0.2,3\n\n"))
     assert demo.n_samples == 3
     with pytest.raises(DataFileError, match="no blank line before line 4"):
-        read_csv(write("x\n1\n\n2\n3\n"), dt=0.1)
-    assert read_csv(write("x\n1\nnan\n2\n\n"), dt=0.1)[0].n_samples == 3
+        read_csv(write("x\n1\n\n2\n3\n"), Selection(dt=0.1))
+    assert read_csv(write("x\n1\nnan\n2\n\n"), Selection(dt=0.1))[0].n_samples == 3
 
 
 @pytest.mark.parametrize(
@@ -299,7 +299,7 @@ def test_names_that_say_nothing_need_columns_when_read(tmp_path):
     write_csv(tmp_path / "f.csv", [demonstration])
     with pytest.raises(DataFileError, match="Say which are positions"):
         read_csv(tmp_path / "f.csv")
-    assert_same(read_csv(tmp_path / "f.csv", columns=["a [b]", "tilt"]), [demonstration])
+    assert_same(read_csv(tmp_path / "f.csv", Selection(columns=["a [b]", "tilt"])), [demonstration])
 
 
 # Damage

@@ -14,7 +14,7 @@ from hypothesis.extra.numpy import arrays
 
 from probdmp.demonstrations import Demonstration
 from probdmp.errors import DataFileError, InputError, InputTypeError
-from probdmp.io import read_demonstrations, read_npz, write_demonstrations, write_npz
+from probdmp.io import Selection, read_demonstrations, read_npz, write_demonstrations, write_npz
 from probdmp.io.archive import LARGEST_ARCHIVE
 
 values = st.floats(-1e100, 1e100) | st.just(float("nan"))
@@ -84,22 +84,22 @@ def test_columns_become_positions_and_channels(small, write):
 
 def test_label_selects(small, write):
     path = write(small)
-    assert_same(read_npz(path, label="a"), [read_npz(path)[i] for i in (0, 2)])
+    assert_same(read_npz(path, Selection(label="a")), [read_npz(path)[i] for i in (0, 2)])
     with pytest.raises(InputError, match=r"label to be one of those in .*f\.npz: 'a' \(2\), 'b' \(1\), got 'c'"):
-        read_npz(path, label="c")
+        read_npz(path, Selection(label="c"))
 
 
 def test_columns_select_and_order(small, write):
     path = write(small)
-    (first, *_) = read_npz(path, columns=["force", "x"])
+    (first, *_) = read_npz(path, Selection(columns=["force", "x"]))
     assert first.names == ("force", "x")
     np.testing.assert_array_equal(first.positions, small["data"][:4, [1, 0]])
     assert list(first.channels) == ["y"]
     for wrong in (["x", "w"], ["x", "x"], []):
         with pytest.raises(InputError, match=r"columns to be different ones of 'x', 'force', 'y' in .*f\.npz, got \["):
-            read_npz(path, columns=wrong)
+            read_npz(path, Selection(columns=wrong))
     with pytest.raises(InputTypeError, match=r"columns as a list.*Write columns=\['x', 'y'\]"):
-        read_npz(path, columns="x,y")
+        read_npz(path, Selection(columns="x,y"))
 
 
 @pytest.mark.parametrize("name", ["x", "y", "z", "q", "q0", "q_7", "qx", "qω"])
@@ -112,7 +112,7 @@ def test_a_file_that_does_not_say_which_columns_are_positions(small, write):
     path = write(small | {"columns": np.array(["X", "xy", "pos_q"])})
     with pytest.raises(DataFileError, match=r"got 'X', 'xy', 'pos_q'\. Say which.*columns=\[\.\.\.\], or --columns"):
         read_npz(path)
-    assert read_npz(path, columns=["X"])[0].names == ("X",)
+    assert read_npz(path, Selection(columns=["X"]))[0].names == ("X",)
 
 
 def test_names_that_do_not_say_positions_survive(tmp_path):
@@ -393,7 +393,7 @@ def test_links_are_followed(small, write, tmp_path):
 def test_suffix_chooses_the_format(small, write, tmp_path):
     path = write(small)
     demonstrations = read_demonstrations(path, label="a", columns=["y"])
-    assert_same(demonstrations, read_npz(path, "a", ["y"]))
+    assert_same(demonstrations, read_npz(path, Selection("a", ["y"])))
     write_demonstrations(tmp_path / "copy.NPZ", demonstrations)
     assert_same(read_demonstrations(str(tmp_path / "copy.NPZ")), demonstrations)
     for name in ("f.txt", "f", "npz"):

@@ -15,7 +15,16 @@ from io_strategies import assert_same_demonstrations
 from probdmp.demonstrations import Demonstration
 from probdmp.demonstrations.clock import grid_places
 from probdmp.errors import DataFileError, InputError, MissingExtraError, RecordingWarning
-from probdmp.io import ParquetExecutions, Span, parquet_executions, read_csv, read_demonstrations, read_parquet, write_parquet
+from probdmp.io import (
+    ParquetExecutions,
+    Selection,
+    Span,
+    parquet_executions,
+    read_csv,
+    read_demonstrations,
+    read_parquet,
+    write_parquet,
+)
 from probdmp.io.parquet_clock import even_clocks
 
 values = st.floats(-1e100, 1e100) | st.just(float("nan"))
@@ -184,12 +193,22 @@ def test_executions_that_cannot_be_used_are_refused_with_a_reason(tmp_path):
     refused("column 't'", t=columns["execution_id"])
     refused("'execution_id' of text or whole numbers", execution_id=columns["t"])
     refused("'primitive' of text", primitive=columns["t"])
-    with pytest.raises(InputError, match="no dt"):
-        read_parquet(written(tmp_path / "good.parquet", columns), dt=0.01)
+    written(tmp_path / "good.parquet", columns)
     with pytest.raises(InputError, match="label to be one of"):
-        read_parquet(tmp_path / "good.parquet", label="z")
+        read_parquet(tmp_path / "good.parquet", Selection(label="z"))
     with pytest.raises(DataFileError, match="x, y, z or q"):
         read_parquet(written(tmp_path / "named.parquet", {k: v for k, v in columns.items() if k not in "xy"}))
+
+
+def test_a_rate_that_is_asked_for_is_that_of_all_executions(tmp_path):
+    columns = rows_of(three())
+    read = read_parquet(written(tmp_path / "one.parquet", columns), Selection(dt=0.02))
+    assert [(d.n_samples, d.dt) for d in read] == [(10, 0.02), (17, 0.02), (10, 0.02)]
+    np.testing.assert_array_equal(read[0].positions, three()[0].positions[::2])
+    columns["t"] = np.where(columns["execution_id"] == "two", 2.0, 1.0) * columns["t"]
+    read = read_parquet(written(tmp_path / "two.parquet", columns), Selection(dt=0.02))
+    assert [d.n_samples for d in read] == [10, 33, 10]
+    np.testing.assert_array_equal(read[1].positions, three()[1].positions)
 
 
 def test_too_long_an_execution_is_not_kept_in_memory(tmp_path, monkeypatch):

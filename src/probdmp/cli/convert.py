@@ -7,7 +7,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from probdmp.cli.exit_codes import usage
-from probdmp.cli.options import Columns, Force, Json, SampleStep, check_recordings_output, names_of
+from probdmp.cli.options import (
+    READ,
+    WRITTEN,
+    Columns,
+    Force,
+    Json,
+    SampleStep,
+    Topic,
+    Trim,
+    check_recordings_output,
+    names_of,
+)
 from probdmp.cli.output import print_json, print_line, print_table
 from probdmp.cli.recordings import read_files
 from probdmp.cli.summaries import name_text
@@ -20,15 +31,15 @@ __all__ = ["convert"]
 
 
 def convert(
-    files: Annotated[
-        list[Path], typer.Argument(metavar="IN…", help="Files to read (.npz, .csv, .parquet).", show_default=False)
-    ],
-    output: Annotated[Path, typer.Argument(metavar="OUT", help="File to write (.npz, .csv, .parquet).", show_default=False)],
+    files: Annotated[list[Path], typer.Argument(metavar="IN…", help=f"Files to read ({READ}).", show_default=False)],
+    output: Annotated[Path, typer.Argument(metavar="OUT", help=f"File to write ({WRITTEN}).", show_default=False)],
     label: Annotated[
         str | None, typer.Option(metavar="LABEL", help="Keep this movement only; recordings without a label are of it.")
     ] = None,
     columns: Columns = None,
     dt: SampleStep = None,
+    topic: Topic = None,
+    trim: Trim = False,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -40,7 +51,7 @@ def convert(
     from probdmp.io import write_demonstrations
 
     check_recordings_output(output, force)
-    recordings = read_files(files, names_of(columns), label, dt)
+    recordings = read_files(files, label, columns=names_of(columns), dt=dt, topic=topic, trim=trim)
     with usage():
         write_demonstrations(output, recordings)
     document = _document(recordings, output)

@@ -105,7 +105,7 @@ def evaluate(
         from probdmp.plotting.style import require_matplotlib
 
         require_matplotlib()
-    demonstrations = read_files(files, names_of(columns), dt=dt)
+    demonstrations = read_files(files, columns=names_of(columns), dt=dt)
     result = evaluation_of(demonstrations, experiment)
     given = [*map(str, files), *_given("--columns", columns), *_given("--dt", dt), *_given("--channels", channels)]
     command = _command([*given, *_given("--coupling", coupling)], experiment, configuration)

@@ -26,7 +26,7 @@ from probdmp.cli.fit_options import (
     WeightUncertainty,
 )
 from probdmp.cli.learning import checked_settings, learn, taught_by_fleet
-from probdmp.cli.options import Columns, Jobs, Json, RecordingFiles, SampleStep, check_output, names_of
+from probdmp.cli.options import Columns, Jobs, Json, RecordingFiles, SampleStep, Topic, Trim, check_output, names_of
 from probdmp.cli.output import print_json, print_line, print_table
 from probdmp.cli.recordings import read_files
 from probdmp.cli.sensor_file import read_sensor_file
@@ -54,6 +54,8 @@ def fit(
     ] = None,
     columns: Columns = None,
     dt: SampleStep = None,
+    topic: Topic = None,
+    trim: Trim = False,
     n_basis: NBasis = 30,
     weight_model: WeightModel = None,
     weight_uncertainty: WeightUncertainty = None,
@@ -99,7 +101,8 @@ def fit(
     file = None if sensors is None else read_sensor_file(sensors)
     from probdmp.estimator import PrimitiveLibrary
 
-    demonstrations = _taught(files, by, most, label, columns, dt)
+    wanted = {"columns": names_of(columns), "dt": dt, "topic": topic, "trim": trim}
+    demonstrations = _taught(files, by, most, label, wanted)
     library = PrimitiveLibrary(learn(demonstrations, settings, jobs))
     calibrate(detector, library, demonstrations, file)
     with usage():
@@ -115,7 +118,7 @@ def fit(
 
 
 def _taught(
-    files: Sequence[Path], by: str | None, most: int | None, label: str | None, columns: str | None, dt: float | None
+    files: Sequence[Path], by: str | None, most: int | None, label: str | None, wanted: Mapping[str, Any]
 ) -> "dict[str, list[Demonstration]]":
     """Demonstrations by label, all that there are, or with `--by` some of a fleet's; what is left out is said."""
     from probdmp.evaluation import group_by_label
@@ -123,8 +126,8 @@ def _taught(
     if by is None:
         if most is not None:
             raise UsageError("--most with --by", "it alone", "Without --by, all recordings teach.")
-        return group_by_label(read_files(files, names_of(columns), label, dt))
-    taught = taught_by_fleet(files, by, most, label, names_of(columns), dt)
+        return group_by_label(read_files(files, label, **wanted))
+    taught = taught_by_fleet(files, by, most, label, wanted)
     for reason, count in taught.left_out.items():
         print(f"probdmp: {count} of the chosen executions left out: {reason}", file=sys.stderr)
     return taught.demonstrations

@@ -77,9 +77,13 @@ def _learned(label: str, members: Sequence["Demonstration"], settings: Mapping[s
 
 
 def taught_by_fleet(
-    files: Sequence[Path], by: str, most: int | None, label: str | None, columns: Sequence[str] | None, dt: float | None
+    files: Sequence[Path], by: str, most: int | None, label: str | None, wanted: Mapping[str, Any]
 ) -> "Teaching":
     """What `--by` learns from.
+
+    Parameters
+    ----------
+    wanted : of `read_demonstrations`: columns, dt, topic, trim; of these, columns alone go with it.
 
     Raises
     ------
@@ -89,9 +93,10 @@ def taught_by_fleet(
     from probdmp.fleet import teaching_executions
     from probdmp.fleet.teaching import MOST_DEMONSTRATIONS
 
-    if len(files) != 1 or files[0].suffix.lower() != ".parquet" or dt is not None:
-        got = "--dt too" if dt is not None else " ".join(map(str, files))
+    others = [f"--{name}" for name in ("dt", "topic", "trim") if wanted[name] not in (None, False)]
+    if len(files) != 1 or files[0].suffix.lower() != ".parquet" or others:
+        got = f"{', '.join(others)} too" if others else " ".join(map(str, files))
         raise UsageError("--by with one .parquet file, which has its own rate", got, "See docs/how-to/fleet.md.")
     with progress("Reading", None) as done:
         chosen = MOST_DEMONSTRATIONS if most is None else most
-        return teaching_executions(files[0], by, most=chosen, columns=columns, label=label, on_part=done)
+        return teaching_executions(files[0], by, most=chosen, columns=wanted["columns"], label=label, on_part=done)

@@ -10,7 +10,7 @@ import typer
 
 from probdmp.cli.detector_summaries import calibration_text, detector_summary, verdict_summary
 from probdmp.cli.exit_codes import FAILURE_DETECTED, UsageError, usage
-from probdmp.cli.options import Goal, Json, Label, ModelFile, Start, StartVelocity, TaskOptions, names_of
+from probdmp.cli.options import READ, Goal, Json, Label, ModelFile, Start, StartVelocity, TaskOptions, names_of
 from probdmp.cli.output import print_json, print_line
 from probdmp.cli.recordings import primitive_of, read_executions
 from probdmp.cli.sensor_file import read_sensor_file
@@ -30,9 +30,7 @@ def monitor(
     model: ModelFile,
     executions: Annotated[
         list[str],
-        typer.Argument(
-            metavar="EXECUTION…|-", help="Recorded executions (.npz, .csv, .parquet), or - for JSON lines.", show_default=False
-        ),
+        typer.Argument(metavar="EXECUTION…|-", help=f"Recorded executions ({READ}), or - for JSON lines.", show_default=False),
     ],
     label: Label = None,
     start: Start = None,
@@ -43,7 +41,7 @@ def monitor(
         float | None,
         typer.Option(
             metavar="S",
-            help="Seconds between ticks of JSON lines, by default as learned; or between samples of .csv files without times.",
+            help="Seconds between ticks of JSON lines, by default as learned; in files as --dt of fit.",
         ),
     ] = None,
     on_alarm: Annotated[

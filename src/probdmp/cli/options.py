@@ -32,36 +32,41 @@ __all__ = [
     "Start",
     "StartVelocity",
     "TaskOptions",
+    "Topic",
+    "Trim",
     "check_output",
     "check_recordings_output",
     "names_of",
 ]
 
 POINT = "X,Y,…"
+READ = ".npz, .csv, .parquet, .mat, .bag, .db3, .mcap, or a folder with meta/info.json or metadata.yaml"
+"""What recordings are read from, as in `io.formats`, which takes long to load."""
+WRITTEN = ".npz, .csv, .parquet, .mcap"
+"""What they are written to."""
 
 ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="Model file made by probdmp fit.", show_default=False)]
-ExecutionFile = Annotated[
-    Path, typer.Argument(metavar="EXECUTION", help="Recorded executions (.npz, .csv, .parquet).", show_default=False)
-]
+ExecutionFile = Annotated[Path, typer.Argument(metavar="EXECUTION", help=f"Recorded executions ({READ}).", show_default=False)]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document, missing numbers as null.")]
 Jobs = Annotated[int, typer.Option("--jobs", min=1, metavar="N", help="Processes; 1 is this one.")]
 Label = Annotated[
     str | None, typer.Option("--label", metavar="LABEL", help="Which primitive, and the recordings with its label.")
 ]
 Index = Annotated[int, typer.Option("--index", min=0, metavar="I", help="Which recording, from 0; with --label, of those.")]
-RecordingFiles = Annotated[
-    list[Path], typer.Argument(metavar="FILE…", help="Recordings (.npz, .csv, .parquet).", show_default=False)
-]
+RecordingFiles = Annotated[list[Path], typer.Argument(metavar="FILE…", help=f"Recordings ({READ}).", show_default=False)]
 Columns = Annotated[
     str | None,
     typer.Option("--columns", metavar="NAMES", help="Columns that are positions, such as x,y. Default: x, y, z and q…."),
 ]
 SampleStep = Annotated[
     float | None,
-    typer.Option(
-        "--dt", metavar="S", help="Of .csv: seconds between samples, for files without times; others are resampled to it."
-    ),
+    typer.Option("--dt", metavar="S", help="Seconds between samples, for files without times; others are resampled to it."),
 ]
+Topic = Annotated[
+    str | None,
+    typer.Option("--topic", metavar="NAME", help="Topic of a robot's recording. Default: the only one with a movement."),
+]
+Trim = Annotated[bool, typer.Option("--trim", help="Cut what stands still before and after each movement.")]
 Sensors = Annotated[
     Path | None,
     typer.Option(
@@ -89,7 +94,7 @@ OutputArrays = Annotated[
 
 Force = Annotated[bool, typer.Option("--force", help="Replace the output file if it exists.")]
 OutputRecordings = Annotated[
-    Path, typer.Option("--output", "-o", metavar="FILE", help="Recordings to write (.npz, .csv, .parquet).", show_default=False)
+    Path, typer.Option("--output", "-o", metavar="FILE", help=f"Recordings to write ({WRITTEN}).", show_default=False)
 ]
 
 
@@ -132,7 +137,7 @@ def check_recordings_output(path: Path, force: bool) -> None:
     """Whether recordings can be written there; none that exist are replaced unless that is asked for."""
     from probdmp.io.formats import FORMATS
 
-    check_output(path, *FORMATS)
+    check_output(path, *(suffix for suffix, known in FORMATS.items() if known.write is not None))
     if path.exists() and not force:
         raise UsageError("an output file that does not exist yet", repr(str(path)), "Use --force to replace it.")
 

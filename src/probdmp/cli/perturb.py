@@ -62,7 +62,7 @@ def perturb(
         raise UsageError("--onset as a fraction between 0 and 1", f"{onset:g}")
     if onset is not None and chosen.takes_others:
         raise UsageError(f"no --onset with {chosen.name}", f"{onset:g}", "It is another movement from the first sample on.")
-    recordings = read_files(files, names_of(columns), dt=dt)
+    recordings = read_files(files, columns=names_of(columns), dt=dt)
     faulty, onsets = _perturbed(recordings, chosen, seed, label, onset)
     with usage():
         write_demonstrations(output, [faulty[k] for k in sorted(faulty)])

@@ -68,7 +68,7 @@ def _demonstrations(request: PictureRequest) -> Picture:
     from probdmp.evaluation import group_by_label
     from probdmp.plotting.demonstrations import class_panels, demonstration_panels
 
-    by_label = group_by_label(read_files([request.file], request.columns, request.label))
+    by_label = group_by_label(read_files([request.file], request.label, columns=request.columns))
     dofs = _dofs(request, next(iter(by_label.values()))[0].names)
     if len(by_label) > 1:
         return Picture(class_panels(by_label, dofs), 5)

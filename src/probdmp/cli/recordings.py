@@ -3,11 +3,11 @@
 import re
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from probdmp.cli.exit_codes import UsageError, usage
 from probdmp.cli.sensor_file import read_sensor_file
@@ -29,20 +29,18 @@ __all__ = [
 ]
 
 
-def read_files(
-    paths: Sequence[Path], columns: Sequence[str] | None, label: str | None = None, dt: float | None = None
-) -> list["Demonstration"]:
+def read_files(paths: Sequence[Path], label: str | None = None, **wanted: Any) -> list["Demonstration"]:
     """Demonstrations from files, all or those with a label.
 
     In several files, recordings without a label are named by their file: those of reach_03.csv are labelled reach.
 
     Parameters
     ----------
-    columns : names of the columns that are positions; as the files say unless given.
-    dt : seconds between samples, for files without times, or to resample to.
+    wanted : of `read_demonstrations`: columns, dt, topic, trim.
     """
-    with nullcontext() if columns is None and dt is None else usage():
-        found = _read(paths, columns, dt)
+    asked = any(value is not None and value is not False for value in wanted.values())
+    with usage() if asked else nullcontext():
+        found = _read(paths, wanted)
     if label is not None:
         return [d for _, d in _labelled(found, label)]
     return [replace(d, label=label_of_file(path)) if len(paths) > 1 and not d.label else d for path, d in found]
@@ -67,7 +65,7 @@ def read_executions(
     _, first = choose_primitive(library, label if label is not None else next(iter(library)))
     primitive = first.primitive_
     with nullcontext() if dt is None else usage():
-        found = _read(paths, primitive.names, dt, outputs)
+        found = _read(paths, {"columns": primitive.names, "dt": dt}, outputs)
     chosen = _labelled(found, label) if label is not None else [(path, _named_by(path, d, library)) for path, d in found]
     units = next((d.units for _, d in chosen if d.units != primitive.units), "")
     if units and primitive.units:
@@ -141,33 +139,32 @@ def _named_by(path: Path, recording: "Demonstration", library: "PrimitiveLibrary
     return replace(recording, label=name) if not recording.label and name in library else recording
 
 
-def _read(
-    paths: Sequence[Path], columns: Sequence[str] | None, dt: float | None, outputs: Sequence[str] = ()
-) -> list[tuple[Path, "Demonstration"]]:
+def _read(paths: Sequence[Path], wanted: Mapping[str, Any], outputs: Sequence[str] = ()) -> list[tuple[Path, "Demonstration"]]:
     """Every recording with its file; what had to be done to its samples is said on standard error."""
     found: list[tuple[Path, Demonstration]] = []
     for path in paths:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", RecordingWarning)
-            found += [(path, d) for d in _recordings(path, columns, dt, outputs)]
+            found += [(path, d) for d in _recordings(path, wanted, outputs)]
         for warning in caught:
             print(f"probdmp: {warning.message}", file=sys.stderr)
     return found
 
 
-def _recordings(path: Path, columns: Sequence[str] | None, dt: float | None, outputs: Sequence[str]) -> list["Demonstration"]:
+def _recordings(path: Path, wanted: Mapping[str, Any], outputs: Sequence[str]) -> list["Demonstration"]:
     """Those of a file; if it has outputs of sensors, but not all positions, these are missing, unless they are outputs too."""
     from probdmp.io import read_demonstrations
 
     try:
-        return read_demonstrations(path, columns=columns, dt=dt)
+        return read_demonstrations(path, **wanted)
     except InputError:
-        needed = {*outputs} & {*(columns or ())}
+        columns = wanted.get("columns") or ()
+        needed = {*outputs} & {*columns}
         for output in outputs:
             with suppress(InputError):
-                found = read_demonstrations(path, columns=[output], dt=dt)
+                found = read_demonstrations(path, **{**wanted, "columns": [output]})
                 if all(needed <= {*d.names, *d.channels} for d in found):
-                    return [_as_seen(d, columns or ()) for d in found]
+                    return [_as_seen(d, columns) for d in found]
         raise
 
 

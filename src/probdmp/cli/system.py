@@ -14,7 +14,9 @@ __all__ = ["print_system", "system_summary"]
 REQUIRED = ("numpy", "scipy", "safetensors", "typer", "rich")
 EXTRAS = {
     "plot": ("matplotlib",),
-    "fleet": ("pyarrow", "dask", "distributed"),
+    "fleet": ("pyarrow", "dask", "distributed", "threadpoolctl"),
+    "lerobot": ("pyarrow",),
+    "ros": ("rosbags", "mcap"),
     "sklearn": ("scikit-learn",),
     "foxglove": ("foxglove-sdk",),
     "rerun": ("rerun-sdk",),

@@ -18,6 +18,7 @@ from probdmp.demonstrations.perturbation import ONSETS, fault_generator, perturb
 from probdmp.demonstrations.resampling import channel_from_times, demonstration_from_times, signals_on_phases
 from probdmp.demonstrations.sigma_lognormal import Strokes
 from probdmp.demonstrations.smoothing import SmoothPath, noise_stds, smooth_path, without_noise
+from probdmp.demonstrations.trimming import trim_still_ends
 
 __all__ = [
     "ARM_MOVEMENTS",
@@ -58,6 +59,7 @@ __all__ = [
     "synthetic_arm_movements",
     "synthetic_contacts",
     "synthetic_letters",
+    "trim_still_ends",
     "without_noise",
     "written_letters",
 ]

@@ -27,6 +27,7 @@ from probdmp.io.csv_header import CUT, LABEL, TIME, split_unit
 from probdmp.io.csv_lines import LARGEST_CSV, LONGEST_LINE, REPLACEMENT
 from probdmp.io.csv_table import read_blocks
 from probdmp.io.recordings import Recordings, check_alike, demonstrations_of, positions_by_name
+from probdmp.io.selection import EVERYTHING, Selection
 
 __all__ = ["read_csv", "write_csv"]
 
@@ -34,23 +35,15 @@ PLAIN = 12
 """Significant digits of times, if dt needs no more: 0.29 rather than 0.29000000000000004."""
 
 
-def read_csv(
-    path: str | os.PathLike[str], label: str | None = None, columns: Sequence[str] | None = None, dt: float | None = None
-) -> list[Demonstration]:
+def read_csv(path: str | os.PathLike[str], selection: Selection = EVERYTHING) -> list[Demonstration]:
     """Demonstrations from a CSV file.
-
-    Parameters
-    ----------
-    label : keep only the demonstrations with this label; those without any get it.
-    columns : names, without units, of the columns that are positions, in the order wanted; by default x, y, z, q… and dof0, ….
-    dt : seconds between samples; needed if the file has no times, otherwise what to resample to.
 
     Raises
     ------
     DataFileError
         If the file is not such a table; the message names line and column.
     InputError, InputTypeError
-        If no demonstration has the label, the file has not the columns, or dt is not positive or needed.
+        If no demonstration has the label, the file has not the columns, or dt is needed.
 
     Warns
     -----
@@ -59,7 +52,7 @@ def read_csv(
     """
     name = os.fspath(path)
     header, blocks = read_blocks(path)
-    step, tables = constant_rate(header, blocks, dt, name)
+    step, tables = constant_rate(header, blocks, selection.dt, name)
     recordings = Recordings(
         data=np.concatenate(tables),
         offsets=[0, *itertools.accumulate(map(len, tables))],
@@ -69,7 +62,7 @@ def read_csv(
         units=list(header.units),
         positions=[],
     )
-    return demonstrations_of(recordings, label, columns, name)
+    return demonstrations_of(recordings, selection, name)
 
 
 def write_csv(path: str | os.PathLike[str], demonstrations: Sequence[Demonstration]) -> None:

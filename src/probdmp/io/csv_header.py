@@ -15,7 +15,7 @@ from typing import NamedTuple
 from probdmp.errors import DataFileError
 from probdmp.io.recordings import MOST_COLUMNS, listing
 
-__all__ = ["CUT", "EXAMPLE", "LABEL", "TIME", "Header", "parse_header", "split_unit"]
+__all__ = ["CUT", "EXAMPLE", "LABEL", "PER_SECOND", "TIME", "Header", "only_of_kind", "parse_header", "split_unit"]
 
 TIME = ("time", "t", "timestamp")
 CUT = ("demonstration", "demo", "trial", "episode", "execution", "recording")
@@ -85,7 +85,7 @@ def parse_header(titles: Sequence[str], place: str) -> Header:
     if len(set(names)) < len(names):
         twice = listing(repr(name) for name in dict.fromkeys(names) if names.count(name) > 1)
         raise DataFileError(f"different names of columns {place}", f"{twice} more than once", EXAMPLE)
-    time, cut, label = (_only(kind, [name for name, _ in pairs], place) for kind in (TIME, CUT, LABEL))
+    time, cut, label = (only_of_kind(kind, [name for name, _ in pairs], place) for kind in (TIME, CUT, LABEL))
     time_unit = "" if time is None else pairs[time][1].lower()
     if time_unit not in PER_SECOND:
         raise DataFileError(f"time in s, ms, us or ns {place}", repr(time_unit), "Convert it to seconds: time [s].")
@@ -102,8 +102,14 @@ def parse_header(titles: Sequence[str], place: str) -> Header:
     )
 
 
-def _only(kind: Sequence[str], names: Sequence[str], place: str) -> int | None:
-    """The place of the column of a kind, if there is one."""
+def only_of_kind(kind: Sequence[str], names: Sequence[str], place: str) -> int | None:
+    """The place of the column of a kind, if there is one.
+
+    Raises
+    ------
+    DataFileError
+        If there are several.
+    """
     found = [i for i, name in enumerate(names) if name.lower() in kind]
     if len(found) > 1:
         got = listing(repr(names[i]) for i in found)

@@ -12,34 +12,27 @@ from probdmp.demonstrations import Demonstration
 from probdmp.errors import InputError
 from probdmp.io.archive import LARGEST_ARCHIVE, read_archive
 from probdmp.io.atomic import write_atomically
+from probdmp.io.constant_rate import resampled
 from probdmp.io.npz_layout import check_recordings
 from probdmp.io.recordings import check_alike, demonstrations_of, positions_by_name
+from probdmp.io.selection import EVERYTHING, Selection
 
 __all__ = ["read_npz", "write_npz"]
 
 
-def read_npz(
-    path: str | os.PathLike[str], label: str | None = None, columns: Sequence[str] | None = None, dt: float | None = None
-) -> list[Demonstration]:
+def read_npz(path: str | os.PathLike[str], selection: Selection = EVERYTHING) -> list[Demonstration]:
     """Demonstrations from an `.npz` file.
-
-    Parameters
-    ----------
-    label : keep only the demonstrations with this label; those without any get it.
-    columns : names of the columns that are positions, in the order wanted; unless given, those that the file says.
-    dt : not to be given; for formats that do not keep one.
 
     Raises
     ------
     DataFileError
         If the file is damaged, too large, not what it claims, or does not say which columns are positions.
     InputError, InputTypeError
-        If no demonstration has the label, the file has not the columns, or a dt is given.
+        If no demonstration has the label, the file has not the columns.
     """
     name = os.fspath(path)
-    if dt is not None:
-        raise InputError(f"no dt for {name}", f"{dt!r}", "An .npz file has its own, which is not to be overruled.")
-    return demonstrations_of(check_recordings(read_archive(path), name), label, columns, name)
+    recordings = resampled(check_recordings(read_archive(path), name), selection.dt, name)
+    return demonstrations_of(recordings, selection, name)
 
 
 def write_npz(path: str | os.PathLike[str], demonstrations: Sequence[Demonstration]) -> None:

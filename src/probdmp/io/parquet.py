@@ -1,4 +1,4 @@
-"""Demonstrations in a Parquet file; its layout is described in `parquet_layout`."""
+"""Demonstrations in a Parquet file: in the layout that `parquet_layout` describes, or in any table, see `parquet_foreign`."""
 
 import io
 import json
@@ -14,32 +14,27 @@ from probdmp.errors import DataFileError, InputError, RecordingWarning
 from probdmp.io.archive import LARGEST_ARCHIVE
 from probdmp.io.atomic import write_atomically
 from probdmp.io.parquet_executions import Executions, ParquetExecutions, Span
-from probdmp.io.parquet_layout import DURATION, ID, LABEL, POSITIONS, STEP, TIME, UNIT, require_pyarrow
+from probdmp.io.parquet_foreign import read_foreign
+from probdmp.io.parquet_layout import DURATION, ID, LABEL, POSITIONS, STEP, TIME, UNIT, layout_of, open_parquet, require_pyarrow
 from probdmp.io.parquet_table import ExecutionTable
-from probdmp.io.recordings import Recordings, check_alike, demonstrations_of, positions_by_name
+from probdmp.io.recordings import check_alike, demonstrations_of, positions_by_name
+from probdmp.io.selection import EVERYTHING, Selection
+from probdmp.io.timed_recordings import Table, recordings_of
 
 __all__ = ["read_parquet", "write_parquet"]
 
 NUMBER_BYTES = 8
 
 
-def read_parquet(
-    path: str | os.PathLike[str], label: str | None = None, columns: Sequence[str] | None = None, dt: float | None = None
-) -> list[Demonstration]:
+def read_parquet(path: str | os.PathLike[str], selection: Selection = EVERYTHING) -> list[Demonstration]:
     """Demonstrations from a Parquet file, all of it; `probdmp.fleet` reads files that are larger than memory.
-
-    Parameters
-    ----------
-    label : keep only the demonstrations of this primitive; those without any get it.
-    columns : names of the columns that are positions, in the order wanted; unless given, those that the file says.
-    dt : not to be given; for formats that do not keep one.
 
     Raises
     ------
     DataFileError
         If the file is damaged, too large, not what it claims, or an execution in it cannot be used.
     InputError, InputTypeError
-        If no demonstration has the label, the file has not the columns, or a dt is given.
+        If no demonstration has the label, the file has not the columns.
     MissingExtraError
         If pyarrow is not installed.
 
@@ -48,27 +43,32 @@ def read_parquet(
     RecordingWarning
         If samples that were left out of an even clock had to be put in.
     """
-    if dt is not None:
-        hint = "A Parquet file has its own, which is not to be overruled."
-        raise InputError(f"no dt for {os.fspath(path)}", f"{dt!r}", hint)
+    name = os.fspath(path)
+    schema = open_parquet(path).schema_arrow
+    if ID not in schema.names or (selection.dt is not None and not layout_of(schema, name).is_dense):
+        return demonstrations_of(read_foreign(path, selection), selection, name)
     file = ParquetExecutions(path)
     tables, executions = _read_all(file)
-    steps = {float(step) for table in tables for step in table.steps}
-    if len(steps) > 1:
-        hint = "Write executions with other rates to other files, or resample them first."
-        raise DataFileError(f"one rate for all executions in {file.path}", f"dt of {sorted(steps)!r:.100}", hint)
-    data = [np.column_stack([table.columns[name] for name in file.layout.columns]) for table in tables]
+    data = np.concatenate([np.column_stack([table.columns[name] for name in file.layout.columns]) for table in tables])
     lengths = np.concatenate([np.diff(table.offsets) for table in tables])
-    recordings = Recordings(
-        data=np.concatenate(data),
-        offsets=[0, *np.cumsum(lengths).tolist()],
-        labels=[executions.labels[code] or "" if code >= 0 else "" for code in executions.codes.tolist()],
-        dt=steps.pop(),
-        columns=list(file.layout.columns),
-        units=[file.layout.units.get(name, "") for name in file.layout.columns],
-        positions=list(file.layout.positions),
-    )
-    return demonstrations_of(recordings, label, columns, file.path)
+    steps = np.concatenate([table.steps for table in tables]).tolist()
+    labels = [executions.labels[code] or "" if code >= 0 else "" for code in executions.codes.tolist()]
+    if selection.dt is None and len(set(steps)) > 1:
+        hint = "Resample them to one: dt=0.01, --dt 0.01 on the command line."
+        raise DataFileError(f"one rate for all executions in {name}", f"dt of {sorted(set(steps))!r:.100}", hint)
+    samples = np.split(data, np.cumsum(lengths)[:-1])
+    own = [
+        Table(
+            dict(zip(file.layout.columns, values.T, strict=True)),
+            step * np.arange(len(values), dtype=np.float64),
+            label,
+            f"in execution {i + 1}",
+            file.layout.units,
+        )
+        for i, (values, step, label) in enumerate(zip(samples, steps, labels, strict=True))
+    ]
+    recordings = recordings_of(own, file.layout.positions, {}, selection.dt or steps[0], name)
+    return demonstrations_of(recordings, selection, name)
 
 
 def _read_all(file: ParquetExecutions) -> tuple[list[ExecutionTable], Executions]:

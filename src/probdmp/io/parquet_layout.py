@@ -14,7 +14,7 @@ Dense, one row per execution: x, y, … are lists, and so is t, or there is a nu
 import json
 import os
 import stat
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -33,8 +33,13 @@ __all__ = [
     "TIME",
     "UNIT",
     "ParquetLayout",
+    "is_list_of_numbers",
+    "is_moment",
+    "is_number",
+    "is_text",
     "layout_of",
     "open_parquet",
+    "positions_told",
     "require_pyarrow",
 ]
 
@@ -65,10 +70,10 @@ class ParquetLayout(NamedTuple):
     """Which columns are positions, if the file says so."""
 
 
-def require_pyarrow() -> None:
+def require_pyarrow(what: str = "Parquet files", extra: str = "fleet") -> None:
     """Refuse, with the command to type, where pyarrow is not installed."""
     if find_spec("pyarrow") is None:
-        raise MissingExtraError("pyarrow for Parquet files", "none installed", "Type: pip install 'probdmp[fleet]'")
+        raise MissingExtraError(f"pyarrow for {what}", "none installed", f"Type: pip install 'probdmp[{extra}]'")
 
 
 def open_parquet(path: str | os.PathLike[str], **options: Any) -> Any:
@@ -116,11 +121,11 @@ def layout_of(schema: "pa.Schema", name: str, label: str = LABEL) -> ParquetLayo
     fields = {field.name: field for field in schema}
     if len(fields) < len(schema) or len(fields) > MOST_COLUMNS:
         raise DataFileError(f"at most {MOST_COLUMNS} columns with different names in {name}", listing(map(repr, schema.names)))
-    is_dense = any(_is_list_of_numbers(field.type) for field in schema)
+    is_dense = any(is_list_of_numbers(field.type) for field in schema)
     reserved = {ID, label, TIME, STEP}
-    is_sample = _is_list_of_numbers if is_dense else _is_number
+    is_sample = is_list_of_numbers if is_dense else is_number
     sampled = [column for column, field in fields.items() if column not in reserved and is_sample(field.type)]
-    told = [column for column in fields if _is_told(column, fields) and _is_number(fields[column].type)]
+    told = [column for column in fields if _is_told(column, fields) and is_number(fields[column].type)]
     has_times = TIME in fields
     _check_columns(fields, is_dense, has_times, label, name)
     metadata = {column: field.metadata or {} for column, field in fields.items()}
@@ -131,14 +136,14 @@ def layout_of(schema: "pa.Schema", name: str, label: str = LABEL) -> ParquetLayo
         tuple(column for column in sampled if column not in told),
         tuple(told),
         {column: own[UNIT].decode(errors="replace") for column, own in metadata.items() if UNIT in own},
-        _positions((schema.metadata or {}).get(POSITIONS, b"[]"), sampled),
+        positions_told(schema, sampled),
     )
 
 
-def _positions(text: bytes, columns: Sequence[str]) -> tuple[str, ...]:
-    """Names of columns from JSON; none if it is anything else."""
+def positions_told(schema: "pa.Schema", columns: Collection[str]) -> tuple[str, ...]:
+    """Which of the columns are positions, if the metadata of a file says so; none if it says anything else."""
     try:
-        names = json.loads(text)
+        names = json.loads((schema.metadata or {}).get(POSITIONS, b"[]"))
     except ValueError:
         return ()
     return tuple(names) if isinstance(names, list) and all(name in columns for name in names) else ()
@@ -148,15 +153,15 @@ def _check_columns(fields: Mapping[str, Any], is_dense: bool, has_times: bool, l
     known = listing(f"{column} ({field.type})" for column, field in fields.items())
     needed = {ID: "text or whole numbers"} | ({label: "text"} if label in fields else {})
     for column, kind in needed.items():
-        fits = column in fields and (_is_text(fields[column].type) or (column == ID and _is_integer(fields[column].type)))
+        fits = column in fields and (is_text(fields[column].type) or (column == ID and _is_integer(fields[column].type)))
         if not fits:
             hint = "Name the column that tells executions apart so." if column == ID else ""
             raise DataFileError(f"a column {column!r} of {kind} in {name}", f"the columns {known}", hint)
     if is_dense:
-        fits = _is_list_of_numbers(fields[TIME].type) if has_times else STEP in fields and _is_number(fields[STEP].type)
+        fits = is_list_of_numbers(fields[TIME].type) if has_times else STEP in fields and is_number(fields[STEP].type)
         expected = f"a column {TIME!r} of lists of seconds, or {STEP!r} of seconds, in {name}"
     else:
-        fits = has_times and (_is_number(fields[TIME].type) or _is_moment(fields[TIME].type))
+        fits = has_times and (is_number(fields[TIME].type) or is_moment(fields[TIME].type))
         expected = f"a column {TIME!r} of seconds, numbers or timestamps, in {name}"
     if not fits:
         raise DataFileError(expected, f"the columns {known}", "Name the column with the times of the samples so.")
@@ -172,28 +177,32 @@ def _is_integer(kind: Any) -> bool:
     return bool(pa.types.is_integer(kind))
 
 
-def _is_number(kind: Any) -> bool:
+def is_number(kind: Any) -> bool:
+    """Whether a column is of numbers."""
     import pyarrow as pa
 
     return bool(_is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind))
 
 
-def _is_moment(kind: Any) -> bool:
+def is_moment(kind: Any) -> bool:
+    """Whether a column is of times that are no plain numbers."""
     import pyarrow as pa
 
     return bool(pa.types.is_timestamp(kind) or pa.types.is_duration(kind))
 
 
-def _is_text(kind: Any) -> bool:
+def is_text(kind: Any) -> bool:
+    """Whether a column is of text."""
     import pyarrow as pa
 
     inner = kind.value_type if pa.types.is_dictionary(kind) else kind
     return bool(pa.types.is_string(inner) or pa.types.is_large_string(inner) or pa.types.is_string_view(inner))
 
 
-def _is_list_of_numbers(kind: Any) -> bool:
+def is_list_of_numbers(kind: Any) -> bool:
+    """Whether a column is of lists of numbers."""
     import pyarrow as pa
 
     types = pa.types
     is_list = types.is_list(kind) or types.is_large_list(kind) or types.is_fixed_size_list(kind)
-    return bool(is_list and (_is_number(kind.value_type)))
+    return bool(is_list and (is_number(kind.value_type)))

@@ -6,7 +6,8 @@ channels.
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from probdmp.demonstrations import Demonstration, as_demonstrations
 from probdmp.errors import DataFileError, InputError, InputTypeError
+from probdmp.io.selection import Selection
 
 __all__ = [
     "MOST_COLUMNS",
@@ -46,17 +48,16 @@ class Recordings(NamedTuple):
     """(C)"""
     positions: list[str]
     """Which columns are positions, if the file says so."""
+    groups: Mapping[str, Sequence[str]] = MappingProxyType({})
+    """Names that stand for several columns, such as that of a field with a column for each axis."""
 
 
-def demonstrations_of(
-    recordings: Recordings, label: str | None, columns: Sequence[str] | None, name: str
-) -> list[Demonstration]:
+def demonstrations_of(recordings: Recordings, selection: Selection, name: str) -> list[Demonstration]:
     """Demonstrations from the content of a file.
 
     Parameters
     ----------
-    label : keep only the demonstrations with this label; those without any get it.
-    columns : names of the columns that are positions, in the order wanted; unless given, those that the file says.
+    selection : which; its label and columns count here.
     name : of the file, for messages.
 
     Raises
@@ -66,7 +67,8 @@ def demonstrations_of(
     InputError, InputTypeError
         If no demonstration has the label, or the file has not the columns.
     """
-    names = _position_columns(recordings, columns, name)
+    label = selection.label
+    names = _position_columns(recordings, selection.columns, name)
     by_name = dict(zip(recordings.columns, recordings.units, strict=True))
     units = {column: by_name[column] for column in names}
     if len(set(units.values())) > 1:
@@ -127,11 +129,13 @@ def _position_columns(recordings: Recordings, columns: Sequence[str] | None, nam
             hint = "Say which are positions: columns=[...], or --columns on the command line."
             raise DataFileError(f"columns named x, y, z or q… in {name}", known or "none of numbers", hint)
         return tuple(chosen)
-    if isinstance(columns, str):
-        raise InputTypeError("columns as a list of names", repr(columns), f"Write columns={columns.split(',')!r}.")
-    if not columns or len(set(columns)) < len(columns) or not set(columns) <= set(recordings.columns):
-        raise InputError(f"columns to be different ones of {known} in {name}", repr(list(columns)))
-    return tuple(columns)
+    chosen = [
+        c for given in columns for c in ([given] if given in recordings.columns else recordings.groups.get(given, [given]))
+    ]
+    if not chosen or len(set(chosen)) < len(chosen) or not set(chosen) <= set(recordings.columns):
+        groups = f"; or all of {listing(map(repr, recordings.groups))}" if recordings.groups else ""
+        raise InputError(f"columns to be different ones of {known} in {name}{groups}", repr(list(columns)))
+    return tuple(chosen)
 
 
 def _demonstration(recordings: Recordings, i: int, label: str | None, names: tuple[str, ...], name: str) -> Demonstration:
