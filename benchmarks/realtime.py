@@ -85,7 +85,7 @@ def paced(step: Callable[[FloatArray], object], observations: FloatArray, period
     for k, observation in enumerate(observations):
         due = start + k * period
         if due - now() > NEARLY:
-            time.sleep(due - now() - NEARLY)
+            time.sleep(max(due - now() - NEARLY, 0.0))
         while now() < due:
             pass
         began = now()

@@ -10,15 +10,18 @@ import numpy as np
 from peers.system import Stepper, System, systems_of
 from probdmp import ProbabilisticDMP
 from probdmp.checks import FloatArray
+from probdmp.execution import SensorArray
+from probdmp.execution.step_filters import step_filter
 from realtime import tended
 from speed.agreement import Agreement, imported
 from speed.interleaving import Clocked, clocked
-from speed.rows import Row, Settings, at_least, duration_text, raced, without_target
+from speed.rows import Row, Settings, at_least, duration_text, raced, ratio_text, without_target
 from speed.workload import N_STEPS, UNCERTAINTIES, learned, model_of, recordings_of, task_of
 
 __all__ = ["STEPPED", "execution_rows", "our_stepper", "peer_stepped", "rollout_rows", "step_agreements", "stepped"]
 
 STEPPED = ("filterpy", "simdkalman")
+FILTER = "the filter alone"
 N_BASIS = 30
 WARM, TICKS = 200, 5_000
 MOST_SECONDS = 20.0
@@ -31,6 +34,14 @@ def our_stepper(movement: str, uncertainty: str = "independent", n_steps: int = 
     task = task_of(dmp)
     dt = float(task.duration) / (n_steps - 1)
     return dmp.execute(start=task.start, goal=task.goal, duration=float(task.duration), dt=dt).step
+
+
+def filter_stepper(movement: str) -> Callable[[FloatArray], Any]:
+    """The same without what `step` does beside filtering: reading, clock, result."""
+    dmp, _ = learned(movement)
+    primitive, task = dmp.primitive_, task_of(dmp)
+    dt = float(task.duration) / (N_STEPS - 1)
+    return step_filter(primitive, task, dt, N_STEPS, SensorArray(primitive)).step
 
 
 def stepped(begin: Callable[[], Callable[[FloatArray], object]], observations: FloatArray) -> Clocked:
@@ -71,12 +82,16 @@ def execution_rows(settings: Settings) -> Iterator[Row]:
     times = raced(
         {
             "probdmp": stepped(partial(our_stepper, "arm"), observations),
+            FILTER: stepped(partial(filter_stepper, "arm"), observations),
             **{name: peer_stepped(name, systems, observations) for name in STEPPED},
         },
         settings.rounds,
     )
     for name, least in (("filterpy", 2000), ("simdkalman", 100)):
         yield at_least(f"online step, 7 degrees of freedom, against {name}", times, name, "probdmp", least, N_STEPS, "step")
+        if name in times:
+            ratio, took = ratio_text(times.ratio(name, FILTER)), duration_text(times.typical(FILTER) / N_STEPS)
+            yield without_target(f"the same, {FILTER}, against {name}", ratio, f"{took} per step")
     for uncertainty, whose in UNCERTAINTIES.items():
         seconds = _each_tick(uncertainty)
         median, late = np.quantile(seconds, [0.5, 0.99])

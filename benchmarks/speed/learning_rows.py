@@ -28,10 +28,15 @@ def learning_rows(settings: Settings) -> Iterator[Row]:
     contestants: dict[str, Clocked | None] = {
         "default": clocked(lambda: ProbabilisticDMP().fit([one])),
         "simple": clocked(lambda: ProbabilisticDMP(**SIMPLE).fit([one])),  # type: ignore[arg-type]
+        "published": clocked(lambda: ProbabilisticDMP.as_published(N_BASIS).fit([one])),
         PEER: None if peer is None else clocked(peer.fit_call(one.positions, dt, N_BASIS)),
     }
     times = raced(contestants, max(3, settings.rounds // 2))
-    for name, whose in (("simple", "`independent` weights"), ("default", "`joint` weights (the default)")):
+    for name, whose in (
+        ("published", "`as_published()`"),
+        ("simple", "`independent` weights"),
+        ("default", "`joint` weights (the default)"),
+    ):
         yield at_least(f"fit, one demonstration 200 × 7, {whose}, against {PEER}", times, PEER, name, 4)
     several = interleaved({"fit": clocked(lambda: ProbabilisticDMP().fit(demonstrations))}, max(3, settings.rounds // 3))
     took = several.typical("fit")

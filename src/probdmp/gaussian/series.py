@@ -24,6 +24,7 @@ from probdmp.gaussian.scalar_systems import ScalarSystems, filter_scalar_systems
 __all__ = ["SharedGains", "score_series", "shared_gains", "shifted_paths", "smooth_series"]
 
 MOST_THREADS = 1024
+FEW = 8
 
 
 class SharedGains(NamedTuple):
@@ -116,14 +117,19 @@ def score_series(
     if len(observed) == 0:
         return np.zeros(0)
 
-    def score(part: slice) -> None:
-        own = expected if len(expected) == 1 else expected[part]
-        kernels.squared_innovations(*gains.recursion, observed[part], own, squares[part])
-
     if n_threads == 1:  # a single short series takes less time than to ask for threads
         kernels.squared_innovations(*gains.recursion, observed, expected, squares)
     else:
+
+        def score(part: slice) -> None:
+            own = expected if len(expected) == 1 else expected[part]
+            kernels.squared_innovations(*gains.recursion, observed[part], own, squares[part])
+
         kernels.in_threads(score, len(observed), check_count(n_threads, "n_threads", most=MOST_THREADS))
+    if squares.size <= FEW:  # numbers of which each takes less time than a call
+        sums = [sum(of_each) for of_each in squares.tolist()]
+        if all(some < LARGEST_MAGNITUDE for some in sums):
+            return np.array([gains.constant - 0.5 * some for some in sums])
     total = np.add.reduce(squares, axis=1)
     if np.maximum.reduce(total) < LARGEST_MAGNITUDE:  # no NaN among them, and no infinity
         return gains.constant - 0.5 * total
