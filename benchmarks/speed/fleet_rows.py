@@ -16,14 +16,14 @@ TARGET_COUNT = 1_000_000
 
 
 def fleet_rows(settings: Settings) -> Iterator[Row]:
-    """With two processes, in the time and the memory that the program prints."""
+    """As `probdmp score` does it unless told otherwise, in the time and the memory that the program prints."""
     count = settings.fleet or TARGET_COUNT
     name, target = f"fleet: {count:,} executions × 200 × 2 from Parquet, 2 cores", "≤ 60 s, ≤ 1 GB"
     if not settings.fleet or not PROGRAM.exists():
         yield Row(name, target, "not measured", None, "not asked for" if PROGRAM.exists() else f"there is no {PROGRAM.name}")
         return
     with cores(2):
-        command = [sys.executable, str(PROGRAM), str(count), "--jobs", "2"]
+        command = [sys.executable, str(PROGRAM), str(count)]
         ended = subprocess.run(command, check=False, capture_output=True, text=True)
     if ended.returncode != 0:
         yield Row(name, target, "failed", False, ended.stderr.strip().splitlines()[-1][:200])
