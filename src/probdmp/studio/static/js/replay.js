@@ -1,0 +1,55 @@
+// A recorded execution once more: through the detector, with a scrubber; or as recorded, filtered and smoothed.
+
+import { show } from "./board.js";
+import { on } from "./bus.js";
+import { byId, setChoices, setText } from "./dom.js";
+import { session, setMode } from "./session.js";
+import { send } from "./socket.js";
+import { pointAt } from "./streams.js";
+
+let replayed = null;
+
+function recordings() {
+  const strokes = session.state.labels.flatMap(({ name, strokes, learned }) =>
+    learned ? strokes.map((_, k) => [JSON.stringify({ label: name, index: k }), `${name}, stroke ${k + 1}`]) : []);
+  const imported = session.state.imported.map(({ name, label }, k) =>
+    [JSON.stringify({ label, index: k, imported: true }), `${name ?? "opened"}: ${label}`]);
+  return [...imported, ...strokes];
+}
+
+/** What the server is told of the recording that is chosen. */
+function chosen() {
+  const { label, index, imported } = JSON.parse(byId("recording").value || "{}");
+  return imported ? { label: "imported", index } : { label, index };
+}
+
+function scrubTo(k) {
+  const time = replayed.times[k];
+  const place = replayed.positions[k];
+  const ratio = replayed.test_ratios[k];
+  const text = `${time.toFixed(2)} s${Number.isFinite(ratio) ? `, test ratio ${ratio.toFixed(2)}${ratio > 1 ? " (alarm)" : ""}` : ""}`;
+  setText(byId("scrub-text"), text);
+  byId("scrub").setAttribute("aria-valuetext", text);
+  show({ mark: place.slice(0, 2), frame: null });
+  pointAt(time);
+}
+
+export function startReplay() {
+  on("changed", () => {
+    const all = recordings();
+    setChoices(byId("recording"), all.length ? all : [["", "nothing recorded yet"]]);
+    byId("replay").disabled = byId("compare").disabled = !all.length;
+  });
+  on("replayed", (message) => {
+    replayed = message;
+    setMode("replay");
+    const scrub = byId("scrub");
+    scrub.disabled = false;
+    scrub.max = message.times.length - 1;
+    scrub.value = scrub.max;
+    scrubTo(message.times.length - 1);
+  });
+  byId("replay").addEventListener("click", () => send("replay", chosen()));
+  byId("compare").addEventListener("click", () => send("compare", chosen()));
+  byId("scrub").addEventListener("input", (event) => replayed && scrubTo(Number(event.target.value)));
+}

@@ -1,0 +1,71 @@
+// Teach and trace: what is drawn on the canvas becomes a demonstration, or is scored while it is drawn.
+
+import { show } from "./board.js";
+import { emit, on } from "./bus.js";
+import { byId, setChoices, setText } from "./dom.js";
+import { fitting, followPointer } from "./ink.js";
+import { band, selected, session, setMode } from "./session.js";
+import { send } from "./socket.js";
+
+const FEWEST = 3;
+
+let waiting = []; // samples of a trace that were not sent yet
+
+function sendTrace() {
+  if (waiting.length) send("trace", { points: waiting });
+  waiting = [];
+}
+
+function begin(points) {
+  if (session.mode !== "teach" && session.mode !== "trace") return false;
+  if (session.mode === "trace") {
+    send("trace_begin", { label: byId("trace-label").value || null });
+    emit("tracing");
+    waiting = [...points];
+  }
+  show({ ink: points, frame: null });
+  return true;
+}
+
+function move(fresh) {
+  if (session.mode === "trace") {
+    if (!waiting.length) requestAnimationFrame(sendTrace);
+    waiting.push(...fresh);
+  }
+  show({});
+}
+
+function end(points) {
+  if (session.mode === "trace") {
+    sendTrace();
+    send("trace_end");
+    emit("traced");
+    return;
+  }
+  show({ ink: [] });
+  if (points.length < FEWEST) return; // a tap
+  performance.mark("stroke");
+  send("stroke", { label: selected(), points: fitting(points) });
+}
+
+/** True if `begin` and the rest belong to teaching; playing has its own pointer. */
+export function startTeaching() {
+  followPointer(byId("ink"), { begin, move, end });
+  byId("teach-play").addEventListener("click", () => {
+    setMode("play");
+    byId("play").click();
+    byId("hold").focus();
+  });
+  byId("try-example").addEventListener("click", () => {
+    send("example", { name: session.state.examples[0] });
+    byId("teach-play").focus();
+  });
+  on("changed", () => {
+    byId("teach-play").disabled = !band();
+    byId("try-example").hidden = session.state.labels.some((one) => one.strokes.length) || !session.state.examples.length;
+    setText(byId("try-example"), `Use an example ${session.state.examples[0] ?? ""}`);
+    setText(byId("change"), band()?.change ?? "");
+    const names = session.state.labels.filter((one) => one.learned).map((one) => [one.name, one.name]);
+    setChoices(byId("trace-label"), [["", "every letter"], ...names]);
+  });
+}

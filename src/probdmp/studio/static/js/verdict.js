@@ -1,0 +1,59 @@
+// The verdict in words: what, where, since when, and which letter fits better. A sign goes with every colour.
+
+import { on } from "./bus.js";
+import { byId, make } from "./dom.js";
+
+const SIGNS = { watching: "◌", fine: "✓", failed: "✕", scores: "≈" };
+
+function card(kind, headline, rows = [], more = []) {
+  const place = byId("verdict");
+  place.dataset.kind = kind;
+  const known = rows.filter(([, value]) => value !== null && value !== undefined && value !== "");
+  place.replaceChildren(
+    make("p", { class: "headline" }, make("span", { class: "sign", "aria-hidden": "true", text: SIGNS[kind] }), headline),
+    make("dl", {}, ...known.flatMap(([name, value]) => [make("dt", { text: name }), make("dd", { text: value })])),
+    ...more,
+  );
+}
+
+const when = ({ time, phase }) => {
+  if (time === null || time === undefined) return null;
+  return `${time.toFixed(2)} s${phase === null || phase === undefined ? "" : `, ${Math.round(100 * phase)} % of the way`}`;
+};
+
+function show(verdict) {
+  if (!verdict.failed) {
+    card("fine", "As taught", [["", verdict.text]]);
+    return;
+  }
+  const place = byId("verdict");
+  Object.assign(place.dataset, { time: verdict.time ?? "", phase: verdict.phase ?? "" });
+  card("failed", "Something is wrong", [
+    ["What", [verdict.kind, verdict.cause].filter(Boolean).join(": ")],
+    ["Where", Array.isArray(verdict.blamed) ? verdict.blamed.join(", ") : verdict.blamed],
+    ["Since", when(verdict)],
+    ["Fits better", verdict.better],
+    ["In full", verdict.text],
+  ]);
+}
+
+function showScores({ label, scores }) {
+  const ranked = Object.entries(scores).sort(([, a], [, b]) => b - a);
+  const [best, worst] = [ranked[0]?.[1], ranked.at(-1)?.[1]];
+  const rows = ranked.slice(0, 6).map(([name, score]) => {
+    const meter = make("meter", { min: Math.min(worst, best - 1), max: best, value: score, "aria-label": `${name}: ${score.toFixed(1)} nats per sample` });
+    return make("li", { class: name === label ? "best" : null }, make("span", { text: name }), meter, make("span", { text: score.toFixed(1) }));
+  });
+  card("scores", label ? `Looks like ${label}` : "Nothing that was taught", [], [make("ol", { class: "scores" }, ...rows)]);
+}
+
+export function startVerdict() {
+  on("playing", () => card("watching", "Watching …"));
+  on("tracing", () => card("watching", "Draw …"));
+  on("verdict", show);
+  on("recognised", showScores);
+  on("replayed", ({ verdict }) => verdict && show(verdict));
+  on("changed", () => {
+    if (!byId("verdict").childElementCount) card("none", "What the detector says will stand here.");
+  });
+}
