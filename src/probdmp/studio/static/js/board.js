@@ -6,7 +6,7 @@ import { byId } from "./dom.js";
 import { fitCanvas, toPixels } from "./geometry.js";
 import { stroke } from "./paper.js";
 
-const board = { ink: [], trail: [], frame: null, pull: null, mark: null };
+const board = { ink: [], trail: [], frame: null, alarm: null, pull: null, mark: null };
 let asked = false;
 
 /** Draws at the next frame of the screen, once, however often it is asked. */
@@ -36,17 +36,18 @@ function drawPen(context, scale, frame) {
   context.lineWidth = 1.5;
   context.stroke();
   dot(context, toPixels(frame.measured, scale), 6.5, tone);
-  if (frame.failed) {
-    // A cross as well, so that the alarm is not told by colour alone.
-    const [px, py] = toPixels(frame.measured, scale);
-    context.lineWidth = 2.5;
-    context.beginPath();
-    for (const side of [-1, 1]) {
-      context.moveTo(px - 13, py - 13 * side);
-      context.lineTo(px + 13, py + 13 * side);
-    }
-    context.stroke();
+}
+
+/** Where it was noticed: a cross, so that it is not told by colour alone. */
+function drawAlarm(context, [x, y]) {
+  context.strokeStyle = colour("--alarm");
+  context.lineWidth = 3;
+  context.beginPath();
+  for (const side of [-1, 1]) {
+    context.moveTo(x - 11, y - 11 * side);
+    context.lineTo(x + 11, y + 11 * side);
   }
+  context.stroke();
 }
 
 function dot(context, [x, y], radius, color) {
@@ -65,17 +66,19 @@ function draw() {
     dot(context, toPixels(board.pull, scale), 4, colour("--alarm"));
   }
   if (board.frame?.kind === "playing") drawPen(context, scale, board.frame);
+  if (board.alarm) drawAlarm(context, toPixels(board.alarm, scale));
   if (board.mark) dot(context, toPixels(board.mark, scale), 6.5, colour("--accent"));
 }
 
 export function startBoard() {
-  on("playing", () => show({ trail: [], ink: [], frame: null, mark: null }));
+  on("playing", () => show({ trail: [], ink: [], frame: null, alarm: null, mark: null }));
   on("frame", (frame) => {
     if (frame.kind === "playing") board.trail.push(frame.measured.slice(0, 2));
+    if (frame.kind === "playing" && frame.failed) board.alarm ??= frame.measured;
     show({ frame });
   });
-  on("played", () => show({ pull: null }));
-  on("mode", () => show({ ink: [], trail: [], frame: null, pull: null, mark: null }));
+  on("played", () => show({ pull: null, frame: null }));
+  on("mode", () => show({ ink: [], trail: [], frame: null, alarm: null, pull: null, mark: null }));
   on("changed", () => show({}));
   new ResizeObserver(refresh).observe(byId("board"));
 }

@@ -28,6 +28,7 @@ export function startConnection() {
     document.body.dataset.connected = "no";
     show("The connection to the server is lost. Trying again …", "Try now", connect);
   });
+  on("taken_over", () => show("This session is open in another tab.", "Use it here", connect));
   on("state", (state) => {
     document.body.dataset.connected = "yes";
     const lost = before?.labels.reduce((sum, one) => sum + one.strokes.length, 0) ?? 0;

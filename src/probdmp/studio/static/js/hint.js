@@ -21,7 +21,7 @@ function teach() {
 
 function play() {
   if (!band()) return "First teach it a letter.";
-  if (session.playing) return outcome === "failed" ? "It noticed." : "Now press on the canvas and hold the pen while it moves.";
+  if (session.playing) return outcome === "failed" ? "It noticed. Let go." : "Now press on the canvas and hold the pen while it moves.";
   if (outcome === "failed") return "It noticed. Drag the start or the goal, and play again.";
   if (outcome === "fine") return "That was as taught. Play again, and hold the pen while it moves.";
   return "Press Play.";

@@ -9,7 +9,7 @@ import { startHint } from "./hint.js";
 import { startLibrary } from "./library.js";
 import { startModes } from "./modes.js";
 import { startPaper } from "./paper.js";
-import { startPlaying } from "./playing.js";
+import { lastFrame, startPlaying } from "./playing.js";
 import { startReplay } from "./replay.js";
 import { startSettings } from "./settings.js";
 import { startStreams, tallied } from "./streams.js";
@@ -24,4 +24,5 @@ for (const start of [
   startLibrary, startReplay, startSettings, startFiles, startCommands, startHint, startToast, startConnection,
 ]) start();
 
-window.studio = { tallied };
+// For benchmarks/studio.py and the tests in a browser.
+window.studio = { lastFrame, tallied };

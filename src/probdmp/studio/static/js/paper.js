@@ -55,6 +55,15 @@ function drawTube(context, tube, scale) {
   context.fill();
 }
 
+/** What is asked for, faintly, while nothing is drawn. */
+function drawWish(context, scale) {
+  context.save();
+  Object.assign(context, { fillStyle: colour("--dot"), globalAlpha: 0.55, textAlign: "center", textBaseline: "middle" });
+  context.font = `italic 300 ${46 * scale}px Georgia, "Times New Roman", serif`;
+  context.fillText(selected(), ...toPixels([WIDTH / 2, HEIGHT / 2 + 3], scale), 80 * scale);
+  context.restore();
+}
+
 function drawEnds(context, mean, scale) {
   const [start, goal] = [toPixels(mean[0], scale), toPixels(mean.at(-1), scale)];
   context.fillStyle = colour("--accent");
@@ -87,6 +96,7 @@ export function drawPaper() {
   drawGrid(context, scale);
   const shown = band();
   const strokes = strokesOf(selected());
+  if (!shown && !strokes.length && session.mode === "teach") drawWish(context, scale);
   if (shown) drawTube(context, shown.tube, scale);
   for (const { points } of strokes) {
     const look = { color: colour("--ink"), width: 1.25, alpha: shown ? 0.28 : 0.75 };

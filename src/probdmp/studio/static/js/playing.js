@@ -8,7 +8,7 @@ import { band, selected, session } from "./session.js";
 import { send } from "./socket.js";
 
 let last = null; // the last frame
-let pull = null; // where the pointer is while it disturbs
+let pull = null; // where the pen is held, or drawn to, while it is disturbed
 let asked = false;
 
 function disturb(at) {
@@ -31,15 +31,20 @@ function press(held) {
 function startPointer() {
   const surface = byId("ink");
   let pointer = null;
+  let grip = [0, 0]; // from the pointer to the pen that it holds: pressing anywhere stops the pen where it is
+  const reach = (event) => toUnits(event, surface.getBoundingClientRect()).map((value, d) => value + grip[d]);
   surface.addEventListener("pointerdown", (event) => {
     if (!session.playing || event.button !== 0) return;
     pointer = event.pointerId;
     surface.setPointerCapture(pointer);
     event.preventDefault();
-    disturb(toUnits(event, surface.getBoundingClientRect()));
+    grip = [0, 0];
+    const at = reach(event);
+    if (last && byId("pointer-mode").value === "hold") grip = at.map((value, d) => last.measured[d] - value);
+    disturb(reach(event));
   });
   surface.addEventListener("pointermove", (event) => {
-    if (event.pointerId === pointer) disturb(toUnits(event, surface.getBoundingClientRect()));
+    if (event.pointerId === pointer) disturb(reach(event));
   });
   const letGo = (event) => {
     if (event.pointerId !== pointer) return;
@@ -69,6 +74,9 @@ function play() {
   }
   send("play", { label: selected(), fault: byId("fault").value || null, speed: Number(byId("speed").value) });
 }
+
+/** Where the pen was, and when: read by tests. */
+export const lastFrame = () => last;
 
 export function startPlaying() {
   startPointer();

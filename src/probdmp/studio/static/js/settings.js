@@ -10,7 +10,7 @@ const CHOSEN = ["weight_model", "discretization", "variant"];
 
 const words = (name) => name.replaceAll("_", " ");
 const nearest = (rate) => RATES.reduce((best, one, k) => (Math.abs(one - rate) < Math.abs(RATES[best] - rate) ? k : best), 0);
-const percent = (rate) => `${Number((100 * rate).toPrecision(3))} in 100 executions`;
+const percent = (rate) => `${Number((100 * rate).toPrecision(2))} in 100 executions`;
 
 function show() {
   const { settings, choices, calibration } = session.state;
@@ -24,13 +24,14 @@ function show() {
   byId("use_pressure").checked = settings.use_pressure;
   if (document.activeElement !== byId("alpha")) byId("alpha").value = nearest(settings.alpha);
   setText(byId("alpha-text"), percent(RATES[byId("alpha").value]));
-  setText(byId("calibration-text"), calibration ? sentence(calibration, settings.alpha) : "A threshold needs a letter that is learned.");
+  byId("calibration").hidden = !calibration;
+  if (calibration) setText(byId("calibration-text"), sentence(calibration, settings.alpha));
 }
 
 function sentence({ n, attainable, text }, alpha) {
-  if (text) return text;
-  const least = `${n} executions vouch for ${percent(attainable)} at best`;
-  return attainable > alpha ? `${least}: teach more for what you ask.` : `${least}.`;
+  if (!attainable) return text;
+  const known = `Calibrated on ${n} demonstrations, which can vouch for ${percent(attainable)} at best`;
+  return attainable > alpha ? `${known}: draw more, or allow more.` : `${known}.`;
 }
 
 export function startSettings() {

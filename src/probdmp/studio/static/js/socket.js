@@ -4,6 +4,7 @@ import { emit } from "./bus.js";
 import { decodeFrame } from "./frames.js";
 
 const FIRST_WAIT = 500; // ms; doubles up to LONGEST_WAIT
+const TAKEN_OVER = 4001; // another page has this session now
 const LONGEST_WAIT = 8000;
 
 let socket = null;
@@ -38,8 +39,12 @@ export function connect() {
     send("hello");
     emit("connected");
   };
-  opened.onclose = () => {
+  opened.onclose = ({ code }) => {
     if (opened !== socket) return;
+    if (code === TAKEN_OVER) {
+      emit("taken_over");
+      return;
+    }
     emit("disconnected", { wait });
     timer = setTimeout(connect, wait);
     wait = Math.min(2 * wait, LONGEST_WAIT);

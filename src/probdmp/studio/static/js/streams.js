@@ -36,14 +36,14 @@ function build() {
   const xRange = () => [0, Math.max(duration, seen.times.at(-1) ?? 0)];
   charts = [
     makeChart(place, {
-      title: "Test ratio over time [s]; an alarm is above the dashed line", xRange, height: 150,
+      title: "Test ratio over time [s]; above the dashed line is an alarm", xRange, height: 130,
       series: [{ label: "threshold", color: "--alarm", dash: [8, 5] }, { label: "test ratio", color: "--accent", width: 2 }],
       range: (_, greatest) => [0, Math.min(ROOM, Math.max(1.5, 1.1 * (greatest ?? 0)))],
     }),
-    makeChart(place, { title: "Log-likelihood per sample", xRange, height: 120, series: [{ label: "log-likelihood", color: "--accent" }] }),
+    makeChart(place, { title: "Log-likelihood per sample", xRange, height: 104, series: [{ label: "log-likelihood", color: "--accent" }] }),
     makeChart(place, {
       title: `Contribution of ${names.map((name, d) => `${name} (${["solid", "dashed", "dotted"][d] ?? "solid"})`).join(", ")}`,
-      xRange, height: 120, series: names.map((name, d) => ({ label: name, color: TONES[d % 3], dash: DASHES[d % 3] })),
+      xRange, height: 104, series: names.map((name, d) => ({ label: name, color: TONES[d % 3], dash: DASHES[d % 3] })),
     }),
   ];
   place.append(make("p", { id: "tally", class: "said" }));

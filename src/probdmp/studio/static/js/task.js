@@ -140,16 +140,17 @@ function adopt(from) {
 }
 
 export function startTask() {
-  let label = null;
+  let shown = null; // session and letter that the handles belong to
   on("band", (message) => {
     if (message.label !== selected()) return;
     answered();
     if (!document.activeElement?.matches("#duration")) showDuration(message.times.at(-1));
   });
   on("changed mode playing played", () => {
-    if (label !== selected()) {
-      label = selected();
-      adopt(band()?.task);
+    const key = `${session.id} ${selected()}`;
+    if (shown !== key) {
+      shown = key;
+      adopt(session.state.task);
       drawVia();
     }
     if (band()) byId("duration").disabled = false;

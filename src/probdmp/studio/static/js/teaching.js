@@ -62,8 +62,9 @@ export function startTeaching() {
   });
   on("changed", () => {
     byId("teach-play").disabled = !band();
+    byId("teach-play").hidden = !session.state.labels.some((one) => one.strokes.length);
     byId("try-example").hidden = session.state.labels.some((one) => one.strokes.length) || !session.state.examples.length;
-    setText(byId("try-example"), `Use an example ${session.state.examples[0] ?? ""}`);
+    setText(byId("try-example"), `Or take a ready-made ${session.state.examples[0] ?? ""}`);
     setText(byId("change"), band()?.change ?? "");
     const names = session.state.labels.filter((one) => one.learned).map((one) => [one.name, one.name]);
     setChoices(byId("trace-label"), [["", "every letter"], ...names]);

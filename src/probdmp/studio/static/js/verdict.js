@@ -16,10 +16,18 @@ function card(kind, headline, rows = [], more = []) {
   );
 }
 
-const when = ({ time, phase }) => {
+let duration = null; // seconds that the movement takes undisturbed
+
+const when = (time) => {
   if (time === null || time === undefined) return null;
-  return `${time.toFixed(2)} s${phase === null || phase === undefined ? "" : `, ${Math.round(100 * phase)} % of the way`}`;
+  const share = duration ? `, ${Math.round((100 * time) / duration)} % of the way` : "";
+  return `${time.toFixed(2)} s${share}`;
 };
+
+const SIDES = { "−x": "x, to the left", "+x": "x, to the right", "−y": "y, downwards", "+y": "y, upwards" };
+
+/** Signs are sides on a canvas. */
+const where = (blamed) => [blamed ?? []].flat().map((name) => SIDES[name] ?? name).join("; ");
 
 function show(verdict) {
   if (!verdict.failed) {
@@ -27,14 +35,13 @@ function show(verdict) {
     return;
   }
   const place = byId("verdict");
-  Object.assign(place.dataset, { time: verdict.time ?? "", phase: verdict.phase ?? "" });
+  Object.assign(place.dataset, { time: verdict.time ?? "", share: duration && verdict.time ? verdict.time / duration : "" });
   card("failed", "Something is wrong", [
     ["What", [verdict.kind, verdict.cause].filter(Boolean).join(": ")],
-    ["Where", Array.isArray(verdict.blamed) ? verdict.blamed.join(", ") : verdict.blamed],
-    ["Since", when(verdict)],
+    ["Where", where(verdict.blamed)],
+    ["Since", when(verdict.time)],
     ["Fits better", verdict.better],
-    ["In full", verdict.text],
-  ]);
+  ], [make("p", { class: "said", text: verdict.text })]);
 }
 
 function showScores({ label, scores }) {
@@ -48,11 +55,17 @@ function showScores({ label, scores }) {
 }
 
 export function startVerdict() {
-  on("playing", () => card("watching", "Watching …"));
+  on("playing", (message) => {
+    duration = message.duration;
+    card("watching", "Watching …");
+  });
   on("tracing", () => card("watching", "Draw …"));
   on("verdict", show);
   on("recognised", showScores);
-  on("replayed", ({ verdict }) => verdict && show(verdict));
+  on("replayed", ({ times, verdict }) => {
+    duration = times.at(-1);
+    if (verdict) show(verdict);
+  });
   on("changed", () => {
     if (!byId("verdict").childElementCount) card("none", "What the detector says will stand here.");
   });
