@@ -1,4 +1,4 @@
-"""A real server, by its command, and a real Chromium; without playwright or a browser these tests are skipped, saying what to type."""
+"""A real server, by its command, and a real Chromium; without one these tests are skipped, saying what to type."""
 
 import os
 import re
@@ -14,7 +14,7 @@ import pytest
 from studio_page import Studio
 
 CHROMIUMS = ("chromium", "chromium-browser", "google-chrome")
-INSTALL = "apt-get install chromium, or set PROBDMP_CHROMIUM to the path of one"
+INSTALL = "sudo apt-get install chromium, or playwright install chromium, or set PROBDMP_CHROMIUM to the path of one"
 
 
 class Server:
@@ -53,27 +53,22 @@ class Server:
 
 
 @pytest.fixture(scope="session")
-def chromium() -> str:
-    pytest.importorskip("playwright", reason="needs playwright: pip install 'probdmp[test]'")
+def browser() -> Iterator[Any]:
     pytest.importorskip("starlette", reason="needs the studio: pip install 'probdmp[studio]'")
-    found = os.environ.get("PROBDMP_CHROMIUM") or next(filter(None, map(shutil.which, CHROMIUMS)), None)
-    if found is None:
-        pytest.skip(f"needs Chromium: {INSTALL}")
-    return found
-
-
-@pytest.fixture(scope="session")
-def browser(chromium: str) -> Iterator[Any]:
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+    api = pytest.importorskip("playwright.sync_api", reason="needs playwright: pip install 'probdmp[test]'")
+    with api.sync_playwright() as playwright:
+        own = playwright.chromium.executable_path
+        known = [os.environ.get("PROBDMP_CHROMIUM"), *map(shutil.which, CHROMIUMS), own if Path(own).exists() else None]
+        found = next(filter(None, known), None)
+        if found is None:
+            pytest.skip(f"needs Chromium: {INSTALL}")
+        opened = playwright.chromium.launch(executable_path=found, args=["--no-sandbox"])
         yield opened
         opened.close()
 
 
 @pytest.fixture(scope="session")
-def server(chromium: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+def server(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """One for all tests that leave it running."""
     started = Server(tmp_path_factory.mktemp("studio"))
     yield started
@@ -81,7 +76,7 @@ def server(chromium: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
 
 
 @pytest.fixture
-def own_server(chromium: str, tmp_path: Path) -> Iterator[Server]:
+def own_server(browser: Any, tmp_path: Path) -> Iterator[Server]:
     """One to be ended and started by the test."""
     started = Server(tmp_path)
     yield started

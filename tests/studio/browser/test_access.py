@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 from studio_page import Studio
 
-NAMELESS = """() => [...document.querySelectorAll('button, a[href], input, select, [role=tab], [role=tabpanel], dialog, canvas[role]')]
-  .filter((one) => {
+NAMELESS = """() => [...document.querySelectorAll(
+    'button, a[href], input, select, [role=tab], [role=tabpanel], dialog, canvas[role]')].filter((one) => {
     const text = (id) => document.getElementById(id)?.textContent.trim();
     const named = one.getAttribute('aria-label') || text(one.getAttribute('aria-labelledby')) ||
       [...(one.labels ?? [])].some((label) => label.textContent.trim()) || (one.matches('button, a') && one.textContent.trim());
@@ -15,7 +15,8 @@ NAMELESS = """() => [...document.querySelectorAll('button, a[href], input, selec
   }).map((one) => one.outerHTML.slice(0, 120))"""
 CONTRAST = """() => {
   const light = (text) => {
-    const [r, g, b] = text.match(/[\\d.]+/g).slice(0, 3).map((c) => c / 255).map((c) => (c <= 0.03928 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4));
+    const linear = (c) => (c <= 0.03928 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
+    const [r, g, b] = text.match(/[\\d.]+/g).slice(0, 3).map((c) => linear(c / 255));
     return 0.2126 * r + 0.7152 * g + 0.0722 * b;
   };
   const behind = (one) => {
@@ -25,8 +26,8 @@ CONTRAST = """() => {
     }
     return 'rgb(255, 255, 255)';
   };
-  const texts = [...document.querySelectorAll('main *, header *')].filter((one) => one.checkVisibility() && !one.closest(':disabled, .unseen') &&
-    [...one.childNodes].some((node) => node.nodeType === 3 && node.textContent.trim()));
+  const texts = [...document.querySelectorAll('main *, header *')].filter((one) => one.checkVisibility() &&
+    !one.closest(':disabled, .unseen') && [...one.childNodes].some((node) => node.nodeType === 3 && node.textContent.trim()));
   return texts.map((one) => {
     const [a, b] = [light(getComputedStyle(one).color), light(behind(one))].sort((x, y) => y - x);
     return [(a + 0.05) / (b + 0.05), one.outerHTML.slice(0, 90)];

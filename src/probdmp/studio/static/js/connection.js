@@ -11,7 +11,7 @@ function show(text, action, act) {
   setText(byId("banner-text"), text);
   const button = byId("banner-action");
   button.hidden = !action;
-  button.textContent = action;
+  if (action) button.textContent = action;
   button.onclick = act;
 }
 
