@@ -16,7 +16,7 @@ from probdmp.demonstrations.letters import LETTERS, WriterVariation, WrittenLett
 from probdmp.demonstrations.live_resampling import LiveResampling
 from probdmp.demonstrations.movement_faults import hold
 from probdmp.demonstrations.perturbation import ONSETS, fault_generator, perturb_executions
-from probdmp.demonstrations.placing import Placement, placement_within
+from probdmp.demonstrations.placing import Placement, are_within, placement_within
 from probdmp.demonstrations.resampling import channel_from_times, demonstration_from_times, signals_on_phases
 from probdmp.demonstrations.sigma_lognormal import Strokes
 from probdmp.demonstrations.smoothing import SmoothPath, noise_stds, smooth_path, without_noise
@@ -45,6 +45,7 @@ __all__ = [
     "Strokes",
     "WriterVariation",
     "WrittenLetter",
+    "are_within",
     "as_demonstrations",
     "channel_from_times",
     "channel_ranges",

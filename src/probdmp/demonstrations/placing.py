@@ -10,7 +10,7 @@ from probdmp.checks import FloatArray, check_array, frozen
 from probdmp.demonstrations.demonstration import Demonstration
 from probdmp.errors import InputError
 
-__all__ = ["Placement", "placement_within"]
+__all__ = ["Placement", "are_within", "placement_within"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,6 +30,20 @@ class Placement:
     def is_identity(self) -> bool:
         """Whether it leaves everything where it is."""
         return self.scale == 1.0 and not np.any(self.shift)
+
+
+def are_within(demonstrations: Sequence[Demonstration], corner: ArrayLike, least: float = 0.1) -> bool:
+    """Whether movements lie in the box from zero to its far corner, and are not lost in it.
+
+    Parameters
+    ----------
+    corner : (D,) array, data units.
+    least : fraction of the box that they extend over at least, together, along some axis.
+    """
+    rows, box = np.concatenate([d.positions for d in demonstrations]), np.asarray(corner, dtype=np.float64)
+    seen = rows[~np.isnan(rows).any(axis=1)]
+    inside = bool(np.all((seen >= 0) & (seen <= box)))
+    return inside and bool(np.any(np.ptp(seen, axis=0) >= least * box)) if len(seen) else False
 
 
 def placement_within(demonstrations: Sequence[Demonstration], corner: ArrayLike, filled: float = 0.6) -> Placement:

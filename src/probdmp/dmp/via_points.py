@@ -73,7 +73,8 @@ def via_points_at(
         `PASSING` of the range.
     start : (D,) array, data units, where the execution starts; as learned unless given.
     """
-    shape, placed = (primitive.n_dof,), []
+    shape = (primitive.n_dof,)
+    placed: list[ViaPoint] = []
     begins = primitive.start if start is None else check_array(start, "start", shape)
     for part, position in points:
         share = check_number(part, "the part of the duration at a via-point")

@@ -15,7 +15,16 @@ from probdmp.plotting.style import BAND, MEAN, axis_label, band, legend_beside
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["QUANTITIES", "band_panels", "ellipses", "evenly_spaced", "path_panel", "plot_path_tube", "plot_rollout", "tube_ellipses"]
+__all__ = [
+    "QUANTITIES",
+    "band_panels",
+    "ellipses",
+    "evenly_spaced",
+    "path_panel",
+    "plot_path_tube",
+    "plot_rollout",
+    "tube_ellipses",
+]
 
 QUANTITIES = {
     "position": ("positions", "position_stds", ""),

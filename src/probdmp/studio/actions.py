@@ -10,7 +10,7 @@ from probdmp.demonstrations import FAULTS
 from probdmp.errors import InputError, InputTypeError
 from probdmp.execution import DISTURBANCES
 from probdmp.studio.commands import commands_of
-from probdmp.studio.fields import choice_of, name_of, number_of, optional_point_of, place_of, points_of
+from probdmp.studio.fields import choice_of, name_of, number_of, optional_name_of, optional_point_of, place_of, points_of
 from probdmp.studio.room import Room
 from probdmp.studio.session import TaskWish
 from probdmp.studio.strokes import EXAMPLES, example_strokes, stroke_of
@@ -54,7 +54,7 @@ async def _stroke(room: Room, message: Message) -> None:
 
 async def _example(room: Room, message: Message) -> None:
     label = choice_of(message, "name", EXAMPLES)
-    room.session.add_strokes(label, example_strokes(label))
+    room.session.add_strokes(label, await room.workers.run(example_strokes, label))
     _taught(room, label)
 
 
@@ -104,10 +104,9 @@ async def _settings(room: Room, message: Message) -> None:
     if session.settings.learns_like(before):
         room.learner.calibrate()
     else:
-        others = [label for label in session.all_strokes() if label != session.selected]
         for label in session.all_strokes():
             session.movements[label].version += 1
-        room.learner.learn(*others, *([session.selected] if session.selected in session.all_strokes() else []))
+        room.learner.learn(*sorted(session.all_strokes(), key=lambda label: label == session.selected))
     room.show_state()
 
 
@@ -158,6 +157,31 @@ async def _export_commands(room: Room, message: Message) -> None:
     room.session.send({"type": "commands", **commands_of(room.session)}, "commands")
 
 
+async def _trace_begin(room: Room, message: Message) -> None:
+    await room.begin_trace(optional_name_of(message))
+
+
+async def _trace(room: Room, message: Message) -> None:
+    await room.trace(points_of(message))
+
+
+async def _trace_end(room: Room, message: Message) -> None:
+    await room.end_trace()
+
+
+async def _replay(room: Room, message: Message) -> None:
+    await room.replay(*_recording_of(room, message))
+
+
+async def _compare(room: Room, message: Message) -> None:
+    await room.compare(*_recording_of(room, message))
+
+
+def _recording_of(room: Room, message: Message) -> tuple[str, int]:
+    label = name_of(message)
+    return label, place_of(message, "index", room.session.n_recordings(label))
+
+
 ACTIONS: dict[str, Callable[[Room, Message], Awaitable[None]]] = {
     "hello": _hello,
     "stroke": _stroke,
@@ -172,6 +196,11 @@ ACTIONS: dict[str, Callable[[Room, Message], Awaitable[None]]] = {
     "play": _play,
     "pointer": _pointer,
     "stop": _stop,
+    "trace_begin": _trace_begin,
+    "trace": _trace,
+    "trace_end": _trace_end,
+    "replay": _replay,
+    "compare": _compare,
     "export_commands": _export_commands,
 }
 """By type of message."""

@@ -39,9 +39,7 @@ def band_view(session: Session, label: str, movement: Movement) -> dict[str, Any
     chosen = evenly_spaced(len(planned.times), MOST_TIMES)
     tube = tube_ellipses(planned.positions[chosen], position_covariances(primitive, task, primitive.dt)[chosen])
     bands: dict[str, Any] = {
-        "path" if quantity == "position" else quantity: _band(
-            getattr(planned, means)[chosen], getattr(planned, stds)[chosen]
-        )
+        "path" if quantity == "position" else quantity: _band(getattr(planned, means)[chosen], getattr(planned, stds)[chosen])
         for quantity, (means, stds, _) in QUANTITIES.items()
     }
     channels = {name: _band(channel.means[chosen], channel.stds[chosen]) for name, channel in planned.channels.items()}

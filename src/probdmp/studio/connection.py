@@ -3,6 +3,7 @@
 import asyncio
 import json
 from contextlib import suppress
+from logging import getLogger
 from typing import TYPE_CHECKING, Any
 
 from probdmp.errors import InputError, ProbDMPError
@@ -17,7 +18,8 @@ if TYPE_CHECKING:
 
 __all__ = ["converse", "parsed"]
 
-GOING_AWAY, POLICY, TOO_BIG, TAKEN_OVER = 1001, 1008, 1009, 4001
+logger = getLogger(__name__)
+TOO_BIG, TAKEN_OVER = 1009, 4001
 """Codes that close a websocket."""
 
 
@@ -41,31 +43,32 @@ def _refuse(constant: str) -> None:
 
 async def converse(socket: "WebSocket", room: Room) -> None:
     """Until the page goes, falls too far behind, or another connection takes its session over."""
-    outbox = Outbox()
-    room.session.outbox = outbox
+    if room.session.outbox is not None:
+        room.session.outbox.end(TAKEN_OVER)
+    outbox = room.session.outbox = Outbox()
     sending = asyncio.create_task(outbox.empty(socket.send_text, socket.send_bytes))
     listening = asyncio.create_task(_listen(socket, room, outbox))
+    ending = asyncio.create_task(outbox.ended.wait())
     try:
-        await asyncio.wait([sending, listening], return_when=asyncio.FIRST_COMPLETED)
-        code = listening.result() if listening.done() and listening.exception() is None else POLICY
-        if code is not None:
-            with suppress(Exception):  # it may have gone already
-                await asyncio.wait_for(socket.close(code), 1.0)
+        await asyncio.wait([sending, listening, ending], return_when=asyncio.FIRST_COMPLETED)
+        if outbox.reason:
+            with suppress(Exception):  # it may have gone already, or be stuck
+                await asyncio.wait_for(socket.close(outbox.reason), 1.0)
     finally:
-        for task in (sending, listening):
+        for task in (sending, listening, ending):
             task.cancel()
-        await asyncio.gather(sending, listening, return_exceptions=True)
+        await asyncio.gather(sending, listening, ending, return_exceptions=True)
         if room.session.outbox is outbox:
             room.session.outbox = None
 
 
-async def _listen(socket: "WebSocket", room: Room, outbox: Outbox) -> int | None:
-    """Take messages one after the other; the code to close with, None if the page has gone."""
+async def _listen(socket: "WebSocket", room: Room, outbox: Outbox) -> None:
+    """Take messages one after the other, until the page has gone or sends too much."""
     n_violations = 0
-    while room.session.outbox is outbox:
+    while n_violations < MOST_VIOLATIONS:
         received = await socket.receive()
         if received["type"] == "websocket.disconnect":
-            return None
+            return
         text = received.get("text")
         try:
             if text is None:
@@ -76,6 +79,8 @@ async def _listen(socket: "WebSocket", room: Room, outbox: Outbox) -> int | None
             await act(room, parsed(text))
         except ProbDMPError as error:
             outbox.send({"type": "error", **views.error_view(error)})
-        if n_violations >= MOST_VIOLATIONS:
-            return TOO_BIG
-    return TAKEN_OVER
+        except Exception as error:
+            logger.exception("in answer to a message of a page")
+            hint = "Please report it with what the server has printed."
+            outbox.send({"type": "error", "expected": "this to work", "got": type(error).__name__, "hint": hint})
+    outbox.end(TOO_BIG)

@@ -33,9 +33,7 @@ def optional_name_of(message: Mapping[str, Any], field: str = "label") -> str | 
     return None if message.get(field) is None else name_of(message, field)
 
 
-def number_of(
-    message: Mapping[str, Any], field: str, least: float, most: float, default: float | None = None
-) -> float:
+def number_of(message: Mapping[str, Any], field: str, least: float, most: float, default: float | None = None) -> float:
     """A number within bounds."""
     value = message.get(field, default)
     wanted = f"{field} as a number from {least:g} to {most:g}"

@@ -4,6 +4,7 @@ __all__ = [
     "CANVAS",
     "DT",
     "FRAME_RATE",
+    "IMPORTED",
     "JOB_SECONDS",
     "LARGEST_MESSAGE",
     "LARGEST_TRANSPORTED",
@@ -18,6 +19,7 @@ __all__ = [
     "MOST_STROKES",
     "MOST_VIOLATIONS",
     "SESSION_SECONDS",
+    "SIMULATED",
 ]
 
 CANVAS = (100.0, 75.0)
@@ -48,9 +50,13 @@ LONGEST_STROKE = 60.0
 MOST_STROKES = 200
 """Of a label."""
 MOST_LABELS = 50
+IMPORTED = "imported"
+"""Stands for executions from files, where a label is asked for."""
 LONGEST_NAME = 60
 """Characters."""
 MOST_SAMPLES = 1_000_000
 """Of all strokes and imported recordings of a session together."""
 JOB_SECONDS = 10.0
 """For which learning, calibrating or reading a file may go on."""
+SIMULATED = 20
+"""Executions drawn from a movement that nobody has executed so yet, to say what is normal for it."""

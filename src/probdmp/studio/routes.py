@@ -1,17 +1,22 @@
 """Which address answers what."""
 
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
 from importlib.resources import files
+from logging import getLogger
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from probdmp import __version__
+from probdmp.errors import InputError, ProbDMPError
 from probdmp.studio.connection import converse
+from probdmp.studio.files import DOWNLOADS, add_contents, add_file, download, received
+from probdmp.studio.jobs import Contents
 from probdmp.studio.limits import MOST_SOCKETS
 from probdmp.studio.room import Room
 from probdmp.studio.session import Session
 from probdmp.studio.sessions import Sessions
+from probdmp.studio.views import error_view
 from probdmp.studio.workers import Workers
 
 if TYPE_CHECKING:
@@ -19,8 +24,9 @@ if TYPE_CHECKING:
     from starlette.responses import Response
     from starlette.websockets import WebSocket
 
-__all__ = ["Studio", "studio_app"]
+__all__ = ["STATIC", "Studio"]
 
+logger = getLogger(__name__)
 STATIC = Path(str(files("probdmp.studio") / "static"))
 
 
@@ -29,17 +35,24 @@ class Studio:
 
     Parameters
     ----------
+    given : contents of the files that every session begins with, by the stem of their names.
     on_ready : called once the server is there.
     """
 
-    def __init__(self, given: Sequence[Path], on_ready: Callable[[], None], workers: Workers | None = None) -> None:
-        self.workers = Workers() if workers is None else workers
+    def __init__(self, given: Mapping[str, Contents], on_ready: Callable[[], None]) -> None:
+        self.workers = Workers()
         self.sessions = Sessions(self._open_room)
         self.n_sockets = 0
         self._given, self._on_ready = given, on_ready
 
     def _open_room(self, name: str) -> Room:
-        return Room(Session(name), self.workers)
+        room = Room(Session(name), self.workers)
+        for stem, contents in self._given.items():
+            try:
+                add_contents(room, stem, contents)
+            except ProbDMPError as error:
+                logger.warning("%s: %s", stem, error)
+        return room
 
     @asynccontextmanager
     async def lifespan(self, app: Any) -> AsyncIterator[None]:
@@ -63,6 +76,33 @@ class Studio:
 
         return FileResponse(STATIC / "index.html")
 
+    async def upload(self, request: "Request") -> "Response":
+        """A file for a session."""
+        from starlette.responses import JSONResponse
+
+        room = self.sessions.find(request.path_params["session"])
+        if room is None:
+            return _no_session()
+        name, use = request.query_params.get("name", ""), request.query_params.get("as")
+        try:
+            taken = await add_file(room, name, await received(request.stream()), use == "execution")
+        except ProbDMPError as error:
+            return JSONResponse({"error": error_view(error)}, 400)
+        return JSONResponse({"imported": {"labels": taken.labels, "note": taken.note}})
+
+    async def download(self, request: "Request") -> "Response":
+        """A file of a session."""
+        from starlette.responses import JSONResponse, Response
+
+        room, name = self.sessions.find(request.path_params["session"]), request.path_params["name"]
+        if room is None or name not in DOWNLOADS:
+            return _no_session()
+        try:
+            body = await download(room, name)
+        except ProbDMPError as error:
+            return JSONResponse({"error": error_view(error)}, 409)
+        return Response(body, media_type=DOWNLOADS[name], headers={"content-disposition": f'attachment; filename="{name}"'})
+
     async def websocket(self, socket: "WebSocket") -> None:
         """A page's connection."""
         if self.n_sockets >= MOST_SOCKETS:
@@ -81,19 +121,8 @@ class Studio:
             self.n_sockets -= 1
 
 
-def studio_app(host: str, token: str | None, given: Sequence[Path], on_ready: Callable[[], None] = lambda: None) -> Any:
-    """The application, as ASGI has it."""
-    from starlette.applications import Starlette
-    from starlette.routing import Mount, Route, WebSocketRoute
-    from starlette.staticfiles import StaticFiles
+def _no_session() -> "Response":
+    from starlette.responses import JSONResponse
 
-    studio = Studio(given, on_ready)
-    return Starlette(
-        routes=[
-            Route("/", studio.page),
-            Route("/health", studio.health),
-            WebSocketRoute("/ws", studio.websocket),
-            Mount("/static", StaticFiles(directory=STATIC)),
-        ],
-        lifespan=studio.lifespan,
-    )
+    missing = InputError("the address of a session that is there", "another one", "Load the page again.")
+    return JSONResponse({"error": error_view(missing)}, 404)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from threading import Timer
+from types import FrameType
 
 from probdmp.errors import MissingExtraError
 
@@ -39,7 +40,9 @@ def require_studio() -> None:
     """Refuse, with the command to type, where the web server is not installed."""
     missing = [name for name in ("starlette", "uvicorn", "websockets") if find_spec(name) is None]
     if missing:
-        raise MissingExtraError(f"{' and '.join(missing)} for the studio", "none installed", "Type: pip install 'probdmp[studio]'")
+        raise MissingExtraError(
+            f"{' and '.join(missing)} for the studio", "none installed", "Type: pip install 'probdmp[studio]'"
+        )
 
 
 def serve(options: StudioOptions, on_ready: Callable[[str], None] = lambda address: None) -> None:
@@ -52,15 +55,17 @@ def serve(options: StudioOptions, on_ready: Callable[[str], None] = lambda addre
     require_studio()
     import uvicorn
 
+    from probdmp.studio.application import studio_app
+    from probdmp.studio.jobs import read_file
     from probdmp.studio.limits import LARGEST_TRANSPORTED
-    from probdmp.studio.routes import studio_app
 
+    given = {path.stem: read_file(str(path)) for path in options.files}
     token = options.token if options.token or options.is_local else secrets.token_urlsafe(24)
     listening = _listening(options)
     port = listening.getsockname()[1]
     shown = f"[{options.host}]" if ":" in options.host else options.host
     address = f"http://{shown}:{port}/" + (f"?token={token}" if token else "")
-    app = studio_app(options.host, token, options.files, lambda: _announce(address, options.opens_browser, on_ready))
+    app = studio_app(options.host, token, given, lambda: _announce(address, options.opens_browser, on_ready))
     config = uvicorn.Config(
         app,
         log_level="warning",
@@ -73,10 +78,14 @@ def serve(options: StudioOptions, on_ready: Callable[[str], None] = lambda addre
         timeout_graceful_shutdown=1,
         server_header=False,
     )
-    try:
-        uvicorn.Server(config).run(sockets=[listening])
-    except KeyboardInterrupt:
-        pass  # how it is meant to end
+
+    class Server(uvicorn.Server):
+        """Ends when it is interrupted, however often, and says nothing about it."""
+
+        def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+            self.should_exit = True
+
+    Server(config).run(sockets=[listening])
 
 
 def _listening(options: StudioOptions) -> socket.socket:

@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from probdmp.checks import FloatArray
-from probdmp.demonstrations import Demonstration
+from probdmp.demonstrations import Demonstration, Placement
 from probdmp.detection import FailureDetector
 from probdmp.errors import InputError, UnknownLabelError
 from probdmp.estimator import ProbabilisticDMP
-from probdmp.studio.limits import MOST_LABELS, MOST_SAMPLES, MOST_STROKES
+from probdmp.studio.limits import IMPORTED, MOST_LABELS, MOST_SAMPLES, MOST_STROKES
 from probdmp.studio.outbox import Outbox
 from probdmp.studio.settings import Settings
 
@@ -26,6 +26,8 @@ class Movement:
     """What was known before the last change, if anything."""
     version: int = 0
     """Goes up with every change of the demonstrations: what was learned from others is of no use."""
+    given_detector: FailureDetector | None = None
+    """That came with the movement, from a file."""
     seconds: float | None = None
     """From the last stroke to the band."""
 
@@ -62,8 +64,8 @@ class Session:
         self.task = TaskWish()
         self.imported: list[Demonstration] = []
         """Recorded executions to be replayed."""
-        self.files: list[str] = []
-        """Names of the files that were imported, for the commands that do it all again."""
+        self.placement: Placement | None = None
+        """How recordings from files were put onto the canvas, if they would not have fitted."""
         self.detectors: dict[str, FailureDetector] = {}
         self.is_calibrated_late = ""
         """Why there are no detectors, if calibrating failed."""
@@ -109,6 +111,8 @@ class Session:
 
     def add_label(self, label: str) -> Movement:
         """The movement with this label, new if there was none."""
+        if label == IMPORTED:
+            raise InputError(f"a label other than {IMPORTED!r}, which stands for executions from files", repr(label))
         if label not in self.movements:
             if len(self.movements) >= MOST_LABELS:
                 raise InputError(f"at most {MOST_LABELS} labels", "one more", "Delete some first.")
@@ -134,14 +138,34 @@ class Session:
             raise InputError(f"at most {MOST_STROKES} executions to replay", f"{len(self.imported) + len(executions)}")
         self.imported.extend(executions)
 
+    def add_movements(self, library: Mapping[str, ProbabilisticDMP], detector: FailureDetector | None) -> None:
+        """Movements from a file, without their demonstrations."""
+        taken = [label for label in library if label in self.movements and self.movements[label].strokes]
+        if taken:
+            raise InputError("a model whose labels are not taken", ", ".join(map(repr, taken)), "Rename yours first.")
+        for label, learned in library.items():
+            movement = self.add_label(label)
+            movement.learned, movement.before, movement.given_detector = learned, None, detector
+            self.selected = label
+
+    def recording(self, label: str, index: int) -> tuple[str, Demonstration]:
+        """A stroke of a label, or an execution from a file, and the label of the movement that it is one of."""
+        if label != IMPORTED:
+            return label, self.movement(label).strokes[index]
+        recording = self.imported[index]
+        return (recording.label if recording.label in self.library else self.learned(None)[0]), recording
+
+    def n_recordings(self, label: str) -> int:
+        """How many there are to choose from."""
+        return len(self.imported) if label == IMPORTED else len(self.movement(label).strokes)
+
     def rename(self, label: str, name: str) -> None:
         """Give a movement another label."""
         self.movement(label)
-        if name in self.movements:
+        if name in self.movements or name == IMPORTED:
             raise InputError("a label that is not taken", repr(name), "Delete the other one first.")
         self.movements = {name if key == label else key: m for key, m in self.movements.items()}
         self.selected = name if self.selected == label else self.selected
-        self.movements[name].version += 1
 
     def delete(self, label: str) -> None:
         """Forget a movement."""

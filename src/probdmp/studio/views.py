@@ -1,17 +1,17 @@
 """What a page is shown: values of the library as messages."""
 
-from collections.abc import Mapping
 from typing import Any
 
 from probdmp import __version__
 from probdmp.demonstrations import FAULTS, Demonstration
 from probdmp.detection import Verdict
-from probdmp.dmp import Task
+from probdmp.detection.calibration_facts import CalibrationFacts
 from probdmp.errors import ProbDMPError
-from probdmp.estimator import ProbabilisticDMP
+from probdmp.execution import Judgement
 from probdmp.io.plain_values import plain
 from probdmp.plotting.trajectories import evenly_spaced
 from probdmp.studio.commands import commands_of
+from probdmp.studio.limits import SIMULATED
 from probdmp.studio.session import Session
 from probdmp.studio.settings import CHOICES
 from probdmp.studio.strokes import EXAMPLES
@@ -65,37 +65,42 @@ def task_view(session: Session) -> dict[str, Any]:
     return plain({"start": wish.start, "goal": wish.goal, "via": via, "duration": wish.duration})
 
 
-def calibration_view(session: Session, task: Task | None = None) -> dict[str, Any] | None:
+def calibration_view(session: Session) -> dict[str, Any] | None:
     """How far alarms about the selected movement may be trusted; None before anything was learned."""
-    label = session.selected
-    learned = None if label is None or label not in session.movements else session.movements[label].learned
-    if label is None or learned is None:
+    movement = session.movements.get(session.selected or "")
+    if movement is None or movement.learned is None:
         return None
-    detector, alpha = session.detectors.get(label), session.settings.alpha
-    known = detector is not None and any(p is learned.primitive_ or p.identity == learned.primitive_.identity
-                                         for p in detector.primitives_.values())
-    unknown: dict[str, Any] = {"n": 0, "attainable": None, "alpha": alpha, "guarantee": "none"}
-    if session.is_calibrated_late:
-        return unknown | {"text": f"Not calibrated: {session.is_calibrated_late}"}
-    if detector is None or not known:
-        return unknown | {"text": "Not calibrated yet."}
+    detector, identity = session.detectors.get(session.selected or ""), movement.learned.primitive_.identity
+    unknown = {"n": 0, "attainable": None, "alpha": session.settings.alpha, "guarantee": "none"}
+    if detector is None or identity not in {p.identity for p in detector.primitives_.values()}:
+        why = session.is_calibrated_late
+        return unknown | {"text": f"Not calibrated. {why}" if why else "Being calibrated."}
     if not detector.calibrations_:
-        text = "One demonstration says nothing of how they vary: the paper's rule watches. Draw it again to calibrate."
-        return unknown | {"n": 1, "text": text}
+        text = "One demonstration does not say how they vary: the paper's rule watches. Draw it again to calibrate."
+        return unknown | {"n": len(movement.strokes), "text": text}
     facts = detector.calibrations_[0]
-    text = f"Calibrated on {facts.n} demonstrations, each judged by what the others teach; they can vouch for {facts.attainable_rate:.3g}."
     return {
         "n": facts.n,
         "attainable": facts.attainable_rate,
         "alpha": facts.false_alarm_rate,
         "guarantee": facts.guarantee,
-        "text": text,
+        "text": _calibration_text(facts, has_strokes=bool(movement.strokes)),
     }
 
 
-def verdict_view(verdict: Verdict | None) -> dict[str, Any]:
+def _calibration_text(facts: CalibrationFacts, has_strokes: bool) -> str:
+    if has_strokes and facts.source == "leave_one_out":
+        source = f"Calibrated on {facts.n} demonstrations, each judged by what the others teach"
+    elif facts.source == "held_out" and facts.n == SIMULATED:
+        source = f"Calibrated on {facts.n} executions drawn from the movement itself, for want of recorded ones"
+    else:
+        source = f"As calibrated in its file, on {facts.n} executions"
+    return f"{source}. So many can vouch for a rate of {facts.attainable_rate:.2g}: {facts.guarantee}."
+
+
+def verdict_view(verdict: Judgement | None) -> dict[str, Any]:
     """What was noticed."""
-    if verdict is None:
+    if not isinstance(verdict, Verdict):
         return {"type": "verdict", "failed": False, "text": "not watched: nothing says what is normal for this movement"}
     return plain(
         {

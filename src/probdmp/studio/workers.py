@@ -46,63 +46,73 @@ class _Worker:
 
 
 class Workers:
-    """A few processes; work waits for one that is free, in the order in which it was asked for.
+    """Two processes, one for what a page waits for, one for what may take seconds; work waits for its turn.
 
     Parameters
     ----------
-    count : of processes.
     seconds : for which a piece of work may go on; then its process is ended and replaced.
     """
 
-    def __init__(self, count: int = 2, seconds: float = JOB_SECONDS) -> None:
-        self._count, self._seconds = count, seconds
-        self._free: asyncio.Queue[_Worker] = asyncio.Queue()
-        self._all: set[_Worker] = set()
+    def __init__(self, seconds: float = JOB_SECONDS) -> None:
+        self._quick, self._long = _Post(seconds), _Post(seconds)
 
     def start(self) -> None:
         """Start the processes; they get ready in the background."""
-        for _ in range(self._count):
-            self._add()
+        self._quick.start()
+        self._long.start()
 
     def stop(self) -> None:
         """End them."""
-        for worker in self._all:
-            worker.end()
-        self._all.clear()
+        self._quick.stop()
+        self._long.stop()
 
     async def run(self, work: Callable[..., Result], *arguments: Any) -> Result:
-        """What a function of `probdmp.studio.jobs` returns, or the error it raises.
+        """What a function returns, or the error it raises.
 
         Raises
         ------
         InputError
             If it takes longer than allowed, or its process dies.
         """
-        worker = await self._free.get()
-        try:
-            return await worker.run(work, arguments, self._seconds)
-        except (TimeoutError, BrokenProcessPool) as error:
-            worker = self._replaced(worker)
-            late = isinstance(error, TimeoutError)
-            got = f"more than {self._seconds:g} s" if late else "a process that ended, perhaps for lack of memory"
-            hint = "Fewer or shorter strokes, or fewer basis functions, take less."
-            raise InputError(f"work of at most {self._seconds:g} s", got, hint) from error
-        except asyncio.CancelledError:
-            worker = self._replaced(worker)
-            raise
-        finally:
-            if worker in self._all:
-                self._free.put_nowait(worker)
+        return await self._quick.run(work, arguments)
 
-    def _add(self) -> None:
-        worker = _Worker()
-        self._all.add(worker)
-        self._free.put_nowait(worker)
+    async def run_long(self, work: Callable[..., Result], *arguments: Any) -> Result:
+        """The same for what may take seconds."""
+        return await self._long.run(work, arguments)
 
-    def _replaced(self, worker: _Worker) -> _Worker:
-        worker.end()
-        if worker in self._all:
-            self._all.remove(worker)
-            worker = _Worker()
-            self._all.add(worker)
-        return worker
+
+class _Post:
+    """A process that is replaced when it has to be ended; one piece of work at a time."""
+
+    def __init__(self, seconds: float) -> None:
+        self._seconds, self._turn = seconds, asyncio.Lock()
+        self._worker: _Worker | None = None
+
+    def start(self) -> None:
+        self._worker = _Worker()
+
+    def stop(self) -> None:
+        if self._worker is not None:
+            self._worker.end()
+        self._worker = None
+
+    async def run(self, work: Callable[..., Result], arguments: tuple[Any, ...]) -> Result:
+        async with self._turn:
+            if self._worker is None:
+                raise InputError("a server that is running", "one that has stopped")
+            try:
+                return await self._worker.run(work, arguments, self._seconds)
+            except (TimeoutError, BrokenProcessPool) as error:
+                self._replace()
+                late = isinstance(error, TimeoutError)
+                got = f"more than {self._seconds:g} s" if late else "a process that ended, perhaps for lack of memory"
+                hint = "Fewer or shorter strokes, or fewer basis functions, take less."
+                raise InputError(f"work of at most {self._seconds:g} s", got, hint) from error
+            except asyncio.CancelledError:
+                self._replace()  # it would go on for nobody
+                raise
+
+    def _replace(self) -> None:
+        if self._worker is not None:
+            self._worker.end()
+            self._worker = _Worker()
