@@ -9,7 +9,7 @@ BENCH := benchmarks/.venv
 SOURCES := $(shell find src -name '*.py')
 GALLERY := $(patsubst examples/%.py,build/gallery/%.png,$(wildcard examples/*.py))
 
-.PHONY: demo test browser test-numpy test-slow coverage lint types docs gallery n-basis figures results variation detection bench-env bench bench-detection bench-realtime clean
+.PHONY: demo test browser test-numpy test-slow coverage lint types docs gallery n-basis figures results variation detection bench-env bench bench-detection bench-realtime bench-studio clean
 
 demo: $(VENV)/.demo
 	$(BIN)/probdmp demo
@@ -86,6 +86,11 @@ bench: $(BENCH)/.ready
 # Control loops at 1 kHz, ten seconds each.
 bench-realtime: $(BENCH)/.ready
 	$(BENCH)/bin/python benchmarks/realtime.py
+
+# The studio in Chromium: how long bands take, frames per second; then its picture in docs/images.
+bench-studio: $(VENV)/.test browser
+	$(BIN)/python benchmarks/studio.py
+	$(BIN)/python benchmarks/studio.py --picture docs/images/studio.png
 
 # benchmarks/detection.md: failure detectors against one another, on the recordings that PROBDMP_RECORDINGS points at.
 bench-detection: $(BENCH)/.ready

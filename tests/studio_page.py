@@ -1,6 +1,7 @@
 """What a person does on the page of the studio, and sees there."""
 
 import math
+import time
 from typing import Any
 
 LONG = 20_000
@@ -32,6 +33,13 @@ class Studio:
         page.goto(url)
         page.wait_for_selector("body[data-connected=yes]")
 
+    def until(self, condition: str) -> None:
+        """Waits for a condition in JavaScript. Playwright's own waiting needs eval, which the page forbids."""
+        end = time.monotonic() + LONG / 1000
+        while not self.page.evaluate(condition):
+            assert time.monotonic() < end, f"not so within {LONG / 1000:g} s: {condition}"
+            self.page.wait_for_timeout(15)
+
     def draw(self, shape: Any = loop, shift: float = 0.0, samples: int = 45) -> None:
         """A stroke on the canvas, by the mouse."""
         box = self.page.locator("#ink").bounding_box()
@@ -52,14 +60,14 @@ class Studio:
             self.page.wait_for_selector(f'.label[aria-pressed=true] .name:text-is("{name}")')
         for k in range(strokes):
             self.draw(shape, shift=k - 1)
-            self.page.wait_for_function(f"document.querySelectorAll('#strokes li').length === {k + 1}")
+            self.until(f"document.querySelectorAll('#strokes li').length === {k + 1}")
         self.page.wait_for_selector(f'.label[aria-pressed=true] .count:text-is("{strokes} strokes, learned")')
 
     def use_example(self) -> None:
         """Ten demonstrations by one click, and their detector."""
         self.page.click("#try-example")
         self.page.wait_for_selector("#teach-play:enabled")
-        self.page.wait_for_function("document.getElementById('calibration-text').textContent.startsWith('Calibrated')")
+        self.until("document.getElementById('calibration-text').textContent.startsWith('Calibrated')")
 
     def mode(self, name: str) -> None:
         """Teach, Play, Trace or Replay."""

@@ -77,7 +77,7 @@ def test_a_finger_draws(open_studio: Callable[..., Studio], server: Any) -> None
         touch("touchMove", 80 + 5 * k, 60 + 4 * k)
         studio.page.wait_for_timeout(8)
     touch("touchEnd")
-    studio.page.wait_for_function("document.querySelectorAll('#strokes li').length === 1")
+    studio.until("document.querySelectorAll('#strokes li').length === 1")
 
 
 def test_what_happens_is_said_to_those_who_do_not_see_it(studio: Studio) -> None:

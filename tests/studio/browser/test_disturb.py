@@ -9,7 +9,7 @@ LATENCY = 0.25
 
 def play(studio: Studio) -> None:
     studio.page.click("#teach-play")
-    studio.page.wait_for_function("studio.lastFrame()?.time > 0.2")
+    studio.until("studio.lastFrame()?.time > 0.2")
 
 
 def test_a_held_pen_is_noticed_in_time(studio: Studio) -> None:
@@ -62,10 +62,10 @@ def test_by_keyboard_alone_to_a_verdict(studio: Studio) -> None:
     tab_to("#try-example")
     press("Enter")
     page.wait_for_selector("#teach-play:enabled")
-    page.wait_for_function("document.getElementById('calibration-text').textContent.startsWith('Calibrated')")
+    studio.until("document.getElementById('calibration-text').textContent.startsWith('Calibrated')")
     tab_to("#teach-play")
     press("Enter")
-    page.wait_for_function("studio.lastFrame()?.time > 0.3")
+    studio.until("studio.lastFrame()?.time > 0.3")
     tab_to("#hold")
     press("Space")
     assert page.get_attribute("#hold", "aria-pressed") == "true"
@@ -91,7 +91,7 @@ def test_start_and_goal_are_moved_by_pointer_and_by_keyboard(studio: Studio) -> 
     page.keyboard.press("ArrowRight")
     assert start.get_attribute("aria-label") != before
     page.click("#open-commands")
-    page.wait_for_function("document.getElementById('commands-shell').textContent.includes('--goal')")
+    studio.until("document.getElementById('commands-shell').textContent.includes('--goal')")
 
 
 def test_a_via_point_is_added_timed_and_removed(studio: Studio) -> None:
@@ -114,6 +114,10 @@ def test_what_is_traced_is_recognised(studio: Studio) -> None:
     studio.teach("line", 3, line)
     studio.mode("Trace")
     studio.draw(line)
-    verdict = studio.wait_for_verdict("scores")
-    assert "Looks like line" in verdict["text"]
-    assert studio.page.locator(".scores li").count() == 2
+    studio.page.wait_for_selector("#scores:has-text('Looks like line')")
+    assert studio.page.locator("#scores li").count() == 2
+    assert "As taught" in studio.verdict()["text"]
+    assert studio.page.locator("#charts .uplot").count() == 3
+    studio.page.select_option("#trace-label", "loop")
+    studio.draw(line)
+    assert "line" in studio.wait_for_verdict("failed")["text"]

@@ -12,14 +12,14 @@ def test_a_letter_drawn_three_times_has_a_band(studio: Studio) -> None:
         page.get_attribute("#paper", "aria-label") == "3 strokes of a; the mean path with its band of two standard deviations"
     )
     assert page.locator("#strokes svg polyline").count() == 3
-    page.wait_for_function("document.getElementById('change').textContent.startsWith('the third demonstration')")
+    studio.until("document.getElementById('change').textContent.startsWith('the third demonstration')")
 
 
 def test_hints_count_the_strokes(studio: Studio) -> None:
     studio.draw()
-    studio.page.wait_for_function("document.getElementById('hint').textContent.startsWith('Again, twice more')")
+    studio.until("document.getElementById('hint').textContent.startsWith('Again, twice more')")
     studio.draw(shift=1)
-    studio.page.wait_for_function("document.getElementById('hint').textContent === 'Once more.'")
+    studio.until("document.getElementById('hint').textContent === 'Once more.'")
 
 
 def test_every_quantity_has_charts_of_both_degrees_of_freedom(studio: Studio) -> None:
@@ -33,9 +33,9 @@ def test_every_quantity_has_charts_of_both_degrees_of_freedom(studio: Studio) ->
 def test_a_stroke_is_deleted_and_taken_back(studio: Studio) -> None:
     studio.teach()
     studio.page.get_by_role("button", name="Delete stroke 2 of a").click()
-    studio.page.wait_for_function("document.querySelectorAll('#strokes li').length === 2")
+    studio.until("document.querySelectorAll('#strokes li').length === 2")
     studio.page.get_by_role("button", name="Undo").click()
-    studio.page.wait_for_function("document.querySelectorAll('#strokes li').length === 3")
+    studio.until("document.querySelectorAll('#strokes li').length === 3")
 
 
 def test_a_tap_is_no_stroke(studio: Studio) -> None:
@@ -55,7 +55,7 @@ def test_letters_are_added_renamed_and_deleted(studio: Studio) -> None:
     page.keyboard.press("Enter")
     page.wait_for_selector('.name:text-is("deux")')
     page.get_by_role("button", name="Delete deux and its strokes").click()
-    page.wait_for_function("document.querySelectorAll('#labels .name').length === 1")
+    studio.until("document.querySelectorAll('#labels .name').length === 1")
 
 
 def test_a_name_is_text_whatever_it_contains(studio: Studio) -> None:
@@ -80,4 +80,4 @@ def test_the_model_is_chosen_in_a_dialog(studio: Studio) -> None:
     assert page.inner_text("#n-basis-text") == str(int(before) - 1)
     page.keyboard.press("Escape")
     page.click("#open-commands")
-    page.wait_for_function(f"document.getElementById('commands-shell').textContent.includes('--n-basis {int(before) - 1}')")
+    studio.until(f"document.getElementById('commands-shell').textContent.includes('--n-basis {int(before) - 1}')")

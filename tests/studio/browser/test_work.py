@@ -36,13 +36,11 @@ def letters(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_file_that_is_dropped_is_learned(studio: Studio, letters: Path) -> None:
     drop(studio, letters)
-    studio.page.wait_for_function("document.querySelectorAll('#labels .name').length === 2")
+    studio.until("document.querySelectorAll('#labels .name').length === 2")
     assert studio.page.locator("#labels .name").all_inner_texts() == ["b", "c"]
     assert "letters.npz was opened: b (4), c (4)" in studio.page.inner_text("#toast")
     assert studio.page.is_hidden("#dropzone")
-    studio.page.wait_for_function(
-        "[...document.querySelectorAll('.count')].every((one) => one.textContent.includes('learned'))"
-    )
+    studio.until("[...document.querySelectorAll('.count')].every((one) => one.textContent.includes('learned'))")
 
 
 def test_a_file_that_is_not_understood_says_so(studio: Studio, tmp_path: Path) -> None:
@@ -79,7 +77,7 @@ def test_executions_are_opened_to_be_replayed(studio: Studio, tmp_path: Path) ->
     path = tmp_path / "executions.npz"
     saved.value.save_as(path)
     page.set_input_files("#file-execution", path)
-    page.wait_for_function("document.querySelectorAll('#recording option').length === 20")
+    studio.until("document.querySelectorAll('#recording option').length === 20")
     studio.mode("Replay")
     page.click("#replay")
     page.wait_for_selector("#scrub:enabled")
@@ -109,7 +107,7 @@ def test_two_people_do_not_see_each_other(open_studio: Callable[..., Studio], se
 def test_a_page_that_is_loaded_again_is_the_same_session(studio: Studio) -> None:
     studio.teach(strokes=2)
     studio.page.reload()
-    studio.page.wait_for_function("document.querySelectorAll('#strokes li').length === 2")
+    studio.until("document.querySelectorAll('#strokes li').length === 2")
     studio.page.wait_for_selector("#teach-play:enabled")
 
 
@@ -130,7 +128,7 @@ def test_a_server_that_was_started_again_is_taught_again(open_studio: Callable[.
 def test_commands_are_shown(studio: Studio) -> None:
     studio.use_example()
     studio.page.click("#open-commands")
-    studio.page.wait_for_function("document.getElementById('commands-shell').textContent.includes('probdmp fit')")
+    studio.until("document.getElementById('commands-shell').textContent.includes('probdmp fit')")
     code = studio.page.inner_text("#commands-python")
     compile(code, "session.py", "exec")
     assert "ProbabilisticDMP(" in code, json.dumps(code)

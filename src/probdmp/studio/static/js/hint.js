@@ -41,8 +41,8 @@ export function startHint() {
   on("band learning_failed", () => (learning = false));
   on("playing", () => (outcome = null));
   on("traced", () => (traced = true));
-  on("verdict", ({ failed }) => {
-    outcome = failed ? "failed" : session.playing ? outcome : "fine";
+  on("verdict", ({ failed, final }) => {
+    if (failed || final) outcome = failed ? "failed" : "fine";
   });
   on("changed mode learning learning_failed playing verdict traced played", update);
 }

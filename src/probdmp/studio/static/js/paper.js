@@ -99,7 +99,7 @@ export function drawPaper() {
   if (!shown && !strokes.length && session.mode === "teach") drawWish(context, scale);
   if (shown) drawTube(context, shown.tube, scale);
   for (const { points } of strokes) {
-    const look = { color: colour("--ink"), width: 1.25, alpha: shown ? 0.28 : 0.75 };
+    const look = { color: colour("--ink"), width: 1.25, alpha: shown ? 0.2 : 0.75 };
     stroke(context, points.map(([, x, y]) => [x, y]), scale, look);
   }
   if (shown) {

@@ -26,7 +26,7 @@ function chosen() {
 function scrubTo(k) {
   const time = replayed.times[k];
   const place = replayed.positions[k];
-  const ratio = replayed.test_ratios[k];
+  const ratio = replayed.test_ratios?.[k];
   const text = `${time.toFixed(2)} s${Number.isFinite(ratio) ? `, test ratio ${ratio.toFixed(2)}${ratio > 1 ? " (alarm)" : ""}` : ""}`;
   setText(byId("scrub-text"), text);
   byId("scrub").setAttribute("aria-valuetext", text);

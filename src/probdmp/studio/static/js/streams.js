@@ -4,6 +4,7 @@ import { on } from "./bus.js";
 import { makeChart } from "./chart.js";
 import { onScheme } from "./colours.js";
 import { byId, make, setText } from "./dom.js";
+import { band } from "./session.js";
 import { showTab, tab } from "./tabs.js";
 
 const ROOM = 6; // the vertical axis of the test ratio ends here, so that the threshold stays in sight
@@ -55,8 +56,7 @@ function draw() {
   charts[0].set([seen.times, seen.times.map(() => threshold), seen.testRatio]);
   charts[1].set([seen.times, seen.logLikelihood]);
   charts[2].set([seen.times, ...names.map((_, d) => seen.contributions.map((row) => finite(row[d])))]);
-  const lasted = (tally.last - tally.first) / 1000;
-  if (tally.frames > 1) setText(byId("tally"), `${Math.round((tally.frames - 1) / lasted)} frames a second, ${tally.dropped} dropped`);
+  setText(byId("tally"), tally.dropped ? `${tally.dropped} of ${tally.frames + tally.dropped} moments left out: the connection is slow.` : "");
 }
 
 function refresh() {
@@ -109,14 +109,14 @@ export function pointAt(time) {
 
 export function startStreams() {
   on("playing", begin);
-  on("tracing", () => begin({}));
+  on("tracing", ({ label }) => label && begin({ duration: band()?.times.at(-1) }));
   on("frame", add);
   on("replayed", (message) => {
-    begin({ ...message, duration: message.times.at(-1) });
+    begin({ ...message, duration: message.times.at(-1), threshold: 1 });
     seen = {
       times: message.times,
       logLikelihood: message.log_likelihoods.map(finite),
-      testRatio: message.test_ratios.map(finite),
+      testRatio: message.times.map((_, k) => finite(message.test_ratios?.[k])),
       contributions: message.contributions,
     };
     draw();

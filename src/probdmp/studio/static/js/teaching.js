@@ -19,8 +19,9 @@ function sendTrace() {
 function begin(points) {
   if (session.mode !== "teach" && session.mode !== "trace") return false;
   if (session.mode === "trace") {
-    send("trace_begin", { label: byId("trace-label").value || null });
-    emit("tracing");
+    const label = byId("trace-label").value || null;
+    send("trace_begin", { label });
+    emit("tracing", { label });
     waiting = [...points];
   }
   show({ ink: points, frame: null });
@@ -50,6 +51,7 @@ function end(points) {
 
 /** True if `begin` and the rest belong to teaching; playing has its own pointer. */
 export function startTeaching() {
+  let suggested = null; // the letter that was selected when it was suggested to be traced
   followPointer(byId("ink"), { begin, move, end });
   byId("teach-play").addEventListener("click", () => {
     setMode("play");
@@ -67,6 +69,8 @@ export function startTeaching() {
     setText(byId("try-example"), `Or take a ready-made ${session.state.examples[0] ?? ""}`);
     setText(byId("change"), band()?.change ?? "");
     const names = session.state.labels.filter((one) => one.learned).map((one) => [one.name, one.name]);
-    setChoices(byId("trace-label"), [["", "every letter"], ...names]);
+    setChoices(byId("trace-label"), [...names, ["", "nothing yet: say which it is"]]);
+    const learned = names.some(([name]) => name === selected());
+    if (suggested !== selected() && learned) byId("trace-label").value = suggested = selected();
   });
 }

@@ -3,7 +3,7 @@
 import { on } from "./bus.js";
 import { byId, make } from "./dom.js";
 
-const SIGNS = { watching: "◌", fine: "✓", failed: "✕", scores: "≈" };
+const SIGNS = { watching: "◌", fine: "✓", failed: "✕" };
 
 function card(kind, headline, rows = [], more = []) {
   const place = byId("verdict");
@@ -44,6 +44,7 @@ function show(verdict) {
   ], [make("p", { class: "said", text: verdict.text })]);
 }
 
+/** Log density per sample of each letter, the likeliest first. */
 function showScores({ label, scores }) {
   const ranked = Object.entries(scores).sort(([, a], [, b]) => b - a);
   const [best, worst] = [ranked[0]?.[1], ranked.at(-1)?.[1]];
@@ -51,7 +52,8 @@ function showScores({ label, scores }) {
     const meter = make("meter", { min: Math.min(worst, best - 1), max: best, value: score, "aria-label": `${name}: ${score.toFixed(1)} nats per sample` });
     return make("li", { class: name === label ? "best" : null }, make("span", { text: name }), meter, make("span", { text: score.toFixed(1) }));
   });
-  card("scores", label ? `Looks like ${label}` : "Nothing that was taught", [], [make("ol", { class: "scores" }, ...rows)]);
+  byId("scores").hidden = false;
+  byId("scores").replaceChildren(make("p", { class: "headline", text: `Looks like ${label}` }), make("ol", {}, ...rows));
 }
 
 export function startVerdict() {
@@ -59,7 +61,12 @@ export function startVerdict() {
     duration = message.duration;
     card("watching", "Watching …");
   });
-  on("tracing", () => card("watching", "Draw …"));
+  on("tracing", ({ label }) => {
+    duration = null;
+    if (label) card("watching", "Watching …");
+    else card("none", "Without a letter to score it as, there is no verdict.");
+  });
+  on("mode", ({ mode }) => (byId("scores").hidden ||= mode !== "trace"));
   on("verdict", show);
   on("recognised", showScores);
   on("replayed", ({ times, verdict }) => {
