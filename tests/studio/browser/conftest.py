@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from studio_page import Studio
+from studio_browser import Studio
 
 CHROMIUMS = ("chromium", "chromium-browser", "google-chrome")
 INSTALL = "sudo apt-get install chromium, or playwright install chromium, or set PROBDMP_CHROMIUM to the path of one"

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from studio_page import Studio
+from studio_browser import Studio
 
 NAMELESS = """() => [...document.querySelectorAll(
     'button, a[href], input, select, [role=tab], [role=tabpanel], dialog, canvas[role]')].filter((one) => {

@@ -1,7 +1,7 @@
 """Play, hold, push; the verdict comes, and says what and when."""
 
 import pytest
-from studio_page import Studio, line
+from studio_browser import Studio, line
 
 LATENCY = 0.25
 """Of the duration, from a hold to its alarm: the 95th percentile on real handwriting is 0.242 or less (docs/monitoring.md)."""

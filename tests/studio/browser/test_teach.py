@@ -1,6 +1,6 @@
 """Strokes of a pointer become what was learned, on the canvas and in the charts."""
 
-from studio_page import Studio, line
+from studio_browser import Studio, line
 
 
 def test_a_letter_drawn_three_times_has_a_band(studio: Studio) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from studio_page import Studio
+from studio_browser import Studio
 
 from probdmp import read_demonstrations, synthetic_letters, write_demonstrations
 
