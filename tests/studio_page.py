@@ -1,85 +1,100 @@
-"""What a person does on the page of the studio, and sees there."""
+"""A page as tests have it: a websocket to a studio that runs in a thread of this process."""
 
-import math
+import json
+import threading
 import time
-from typing import Any
 
-LONG = 20_000
-"""Milliseconds that anything may take on a busy machine."""
+import httpx
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
 
+from probdmp.studio.application import studio_app
+from probdmp.studio.server import make_server
 
-def loop(step: float, shift: float = 0.0) -> tuple[float, float]:
-    """A point of a letter-like curve, in shares of the canvas, at a share of its way; `shift` makes strokes differ."""
-    angle = 2.2 * math.pi * step
-    return 0.35 + 0.3 * step + 0.14 * math.sin(angle) + 0.02 * shift, 0.5 + 0.22 * math.cos(angle) - 0.015 * shift
-
-
-def line(step: float, shift: float = 0.0) -> tuple[float, float]:
-    """Another letter: hardly more than a line."""
-    return 0.2 + 0.6 * step, 0.3 + 0.4 * step + 0.02 * math.sin(7 * step + shift)
+PATIENCE = 20
+"""Seconds."""
 
 
-class Studio:
-    """A page of the studio, open; `complaints` gathers errors of the console and of the page."""
+class RunningStudio:
+    """A studio on a free port of 127.0.0.1."""
 
-    def __init__(self, page: Any, url: str) -> None:
-        self.page = page
-        self.complaints: list[str] = []
-        page.on(
-            "console", lambda message: self.complaints.append(message.text) if message.type in ("error", "warning") else None
-        )
-        page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        page.set_default_timeout(LONG)
-        page.goto(url)
-        page.wait_for_selector("body[data-connected=yes]")
+    def __init__(self, token=None, given=None, host="127.0.0.1", port=0):
+        self.app = studio_app(host, token, given or {})
+        self._server = make_server(self.app)
+        self._server.config.port = port
+        self._thread = threading.Thread(target=self._server.run)
 
-    def until(self, condition: str) -> None:
-        """Waits for a condition in JavaScript. Playwright's own waiting needs eval, which the page forbids."""
-        end = time.monotonic() + LONG / 1000
-        while not self.page.evaluate(condition):
-            assert time.monotonic() < end, f"not so within {LONG / 1000:g} s: {condition}"
-            self.page.wait_for_timeout(15)
+    def __enter__(self):
+        self._thread.start()
+        since = time.monotonic()
+        while not self._server.started:
+            assert time.monotonic() - since < PATIENCE
+            time.sleep(0.01)
+        self.port = self._server.servers[0].sockets[0].getsockname()[1]
+        self.address = f"127.0.0.1:{self.port}"
+        return self
 
-    def draw(self, shape: Any = loop, shift: float = 0.0, samples: int = 45) -> None:
-        """A stroke on the canvas, by the mouse."""
-        box = self.page.locator("#ink").bounding_box()
-        places = [shape(k / (samples - 1), shift) for k in range(samples)]
-        pixels = [(box["x"] + x * box["width"], box["y"] + y * box["height"]) for x, y in places]
-        self.page.mouse.move(*pixels[0])
-        self.page.mouse.down()
-        for x, y in pixels[1:]:
-            self.page.mouse.move(x, y)
-            self.page.wait_for_timeout(8)
-        self.page.mouse.up()
+    def __exit__(self, *_):
+        self._server.should_exit = True
+        self._thread.join(PATIENCE)
+        assert not self._thread.is_alive()
 
-    def teach(self, name: str | None = None, strokes: int = 3, shape: Any = loop) -> None:
-        """Some strokes of a letter, until they are learned."""
-        if name is not None:
-            self.page.fill("#new-label", name)
-            self.page.click("#add-label button")
-            self.page.wait_for_selector(f'.label[aria-pressed=true] .name:text-is("{name}")')
-        for k in range(strokes):
-            self.draw(shape, shift=k - 1)
-            self.until(f"document.querySelectorAll('#strokes li').length === {k + 1}")
-        self.page.wait_for_selector(f'.label[aria-pressed=true] .count:text-is("{strokes} strokes, learned")')
+    def page(self, session=None, **options):
+        return Page(self, session, **options)
 
-    def use_example(self) -> None:
-        """Ten demonstrations by one click, and their detector."""
-        self.page.click("#try-example")
-        self.page.wait_for_selector("#teach-play:enabled")
-        self.until("document.getElementById('calibration-text').textContent.startsWith('Calibrated')")
+    def http(self, **headers):
+        return httpx.Client(base_url=f"http://{self.address}", headers=headers, timeout=PATIENCE)
 
-    def mode(self, name: str) -> None:
-        """Teach, Play, Trace or Replay."""
-        self.page.locator("#modes").get_by_text(name, exact=True).click()
 
-    def verdict(self) -> dict[str, Any]:
-        """The card: its kind, its text, and where it says so, when."""
-        card = self.page.locator("#verdict")
-        data = card.evaluate("card => ({...card.dataset})")
-        return {"kind": data["kind"], "text": card.inner_text(), "time": data.get("time"), "share": data.get("share")}
+class Page:
+    """Says things, and waits for what it is told."""
 
-    def wait_for_verdict(self, kind: str) -> dict[str, Any]:
-        """The card, as soon as it is of this kind."""
-        self.page.wait_for_selector(f"#verdict[data-kind={kind}]")
-        return self.verdict()
+    def __init__(self, studio, session=None, query="", **options):
+        self.studio, self.frames = studio, []
+        query = f"?session={session}" if session else query
+        connection = connect(f"ws://{studio.address}/ws{query}", max_size=None, compression=None, **options)
+        self.socket = connection.__enter__()
+        self.session = session
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.socket.close()
+
+    def say(self, type, **fields):
+        self.socket.send(json.dumps({"type": type, **fields}))
+
+    def hear(self, *types, patience=PATIENCE, where=lambda message: True):
+        """The next message of one of these types; frames before it are kept."""
+        until = time.monotonic() + patience
+        while True:
+            received = self.socket.recv(timeout=max(until - time.monotonic(), 0))
+            if isinstance(received, bytes):
+                self.frames.append(received)
+                continue
+            message = json.loads(received)
+            self.session = message.get("session", self.session)
+            if message["type"] in types and where(message):
+                return message
+
+    def ask(self, type, *answers, **fields):
+        self.say(type, **fields)
+        return self.hear(*(answers or ("error",)))
+
+    def state(self):
+        return self.ask("hello", "state")
+
+    def closing_code(self):
+        """The code with which the server closes, whatever it says before."""
+        try:
+            while True:
+                self.socket.recv(timeout=PATIENCE)
+        except ConnectionClosed as closed:
+            return closed.rcvd.code if closed.rcvd else None
+
+
+def points_of(demonstration, pressure=None):
+    """A stroke as a page sends it."""
+    rows = zip(demonstration.times.tolist(), demonstration.positions.tolist(), strict=True)
+    return [[t, *row, pressure] for t, row in rows]

@@ -13,6 +13,7 @@ __all__ = [
     "LONGEST_STROKE",
     "MOST_LABELS",
     "MOST_POINTS",
+    "MOST_REQUESTS",
     "MOST_SAMPLES",
     "MOST_SESSIONS",
     "MOST_SOCKETS",
@@ -38,6 +39,8 @@ MOST_VIOLATIONS = 3
 LARGEST_UPLOAD = 64 * 1024 * 1024
 """Bytes."""
 MOST_SOCKETS = 32
+MOST_REQUESTS = 256
+"""Connections of all kinds that are answered at a time."""
 MOST_SESSIONS = 128
 """Beyond, those that were left longest ago are forgotten."""
 SESSION_SECONDS = 30 * 60.0

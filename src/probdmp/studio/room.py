@@ -198,8 +198,8 @@ class Room:
 
     async def replay(self, label: str, index: int) -> None:
         """Show an execution as the detector has seen it."""
-        name, recording = self.session.recording(label, index)
-        _, learned = await self._ready(name)
+        own, recording = self.session.recording(label, index)
+        name, learned = await self._ready(own)
         detector = self.session.detectors.get(name)
         if detector is not None and not any(p.identity == learned.primitive_.identity for p in detector.primitives_.values()):
             detector = None
@@ -207,6 +207,6 @@ class Room:
 
     async def compare(self, label: str, index: int) -> None:
         """Show an execution as recorded, filtered, smoothed."""
-        name, recording = self.session.recording(label, index)
-        _, learned = await self._ready(name)
+        own, recording = self.session.recording(label, index)
+        name, learned = await self._ready(own)
         self.session.send(await self.workers.run_long(jobs.compare, name, learned, recording), "compared")

@@ -9,10 +9,11 @@ from importlib.util import find_spec
 from pathlib import Path
 from threading import Timer
 from types import FrameType
+from typing import Any
 
 from probdmp.errors import MissingExtraError
 
-__all__ = ["LOOPBACK", "StudioOptions", "require_studio", "serve"]
+__all__ = ["LOOPBACK", "StudioOptions", "make_server", "require_studio", "serve"]
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
@@ -53,11 +54,8 @@ def serve(options: StudioOptions, on_ready: Callable[[str], None] = lambda addre
     on_ready : called with the address of the page, once it is there.
     """
     require_studio()
-    import uvicorn
-
     from probdmp.studio.application import studio_app
     from probdmp.studio.jobs import read_file
-    from probdmp.studio.limits import LARGEST_TRANSPORTED
 
     given = {path.stem: read_file(str(path)) for path in options.files}
     token = options.token if options.token or options.is_local else secrets.token_urlsafe(24)
@@ -66,6 +64,21 @@ def serve(options: StudioOptions, on_ready: Callable[[str], None] = lambda addre
     shown = f"[{options.host}]" if ":" in options.host else options.host
     address = f"http://{shown}:{port}/" + (f"?token={token}" if token else "")
     app = studio_app(options.host, token, given, lambda: _announce(address, options.opens_browser, on_ready))
+    make_server(app).run(sockets=[listening])
+
+
+def make_server(app: Any) -> Any:
+    """What answers for an application: uvicorn, with limits, ended by the first interruption."""
+    import uvicorn
+
+    from probdmp.studio.limits import LARGEST_TRANSPORTED, MOST_REQUESTS
+
+    class Server(uvicorn.Server):
+        """Ends when it is interrupted, however often, and says nothing about it."""
+
+        def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+            self.should_exit = True
+
     config = uvicorn.Config(
         app,
         log_level="warning",
@@ -74,18 +87,11 @@ def serve(options: StudioOptions, on_ready: Callable[[str], None] = lambda addre
         ws_max_size=LARGEST_TRANSPORTED,
         ws_max_queue=8,
         ws_per_message_deflate=False,
-        limit_concurrency=256,
+        limit_concurrency=MOST_REQUESTS,
         timeout_graceful_shutdown=1,
         server_header=False,
     )
-
-    class Server(uvicorn.Server):
-        """Ends when it is interrupted, however often, and says nothing about it."""
-
-        def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-            self.should_exit = True
-
-    Server(config).run(sockets=[listening])
+    return Server(config)
 
 
 def _listening(options: StudioOptions) -> socket.socket:

@@ -148,12 +148,12 @@ class Session:
             movement.learned, movement.before, movement.given_detector = learned, None, detector
             self.selected = label
 
-    def recording(self, label: str, index: int) -> tuple[str, Demonstration]:
+    def recording(self, label: str, index: int) -> tuple[str | None, Demonstration]:
         """A stroke of a label, or an execution from a file, and the label of the movement that it is one of."""
         if label != IMPORTED:
             return label, self.movement(label).strokes[index]
         recording = self.imported[index]
-        return (recording.label if recording.label in self.library else self.learned(None)[0]), recording
+        return (recording.label if recording.label in self.movements else self.selected), recording
 
     def n_recordings(self, label: str) -> int:
         """How many there are to choose from."""

@@ -18,19 +18,21 @@ __all__ = ["Workers"]
 Result = TypeVar("Result")
 
 
-def _prepare() -> None:
+def _prepare(warms_up: bool) -> None:
     """In a new process: what every piece of work needs, loaded; interruptions are for the parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    import probdmp.studio.jobs
+    if warms_up:
+        from probdmp.studio.jobs import warm_up
 
-    probdmp.studio.jobs.warm_up()
+        warm_up()
 
 
 class _Worker:
     """One process, known by its number so that it can be ended."""
 
-    def __init__(self) -> None:
-        self._executor = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=_prepare)
+    def __init__(self, warms_up: bool) -> None:
+        context = get_context("spawn")
+        self._executor = ProcessPoolExecutor(1, mp_context=context, initializer=_prepare, initargs=(warms_up,))
         self._number = self._executor.submit(os.getpid)
 
     async def run(self, work: Callable[..., Result], arguments: tuple[Any, ...], seconds: float) -> Result:
@@ -51,10 +53,11 @@ class Workers:
     Parameters
     ----------
     seconds : for which a piece of work may go on; then its process is ended and replaced.
+    warms_up : whether what the work needs is loaded beforehand.
     """
 
-    def __init__(self, seconds: float = JOB_SECONDS) -> None:
-        self._quick, self._long = _Post(seconds), _Post(seconds)
+    def __init__(self, seconds: float = JOB_SECONDS, warms_up: bool = True) -> None:
+        self._quick, self._long = _Post(seconds, warms_up), _Post(seconds, warms_up)
 
     def start(self) -> None:
         """Start the processes; they get ready in the background."""
@@ -84,12 +87,12 @@ class Workers:
 class _Post:
     """A process that is replaced when it has to be ended; one piece of work at a time."""
 
-    def __init__(self, seconds: float) -> None:
-        self._seconds, self._turn = seconds, asyncio.Lock()
+    def __init__(self, seconds: float, warms_up: bool) -> None:
+        self._seconds, self._warms_up, self._turn = seconds, warms_up, asyncio.Lock()
         self._worker: _Worker | None = None
 
     def start(self) -> None:
-        self._worker = _Worker()
+        self._worker = _Worker(self._warms_up)
 
     def stop(self) -> None:
         if self._worker is not None:
@@ -115,4 +118,4 @@ class _Post:
     def _replace(self) -> None:
         if self._worker is not None:
             self._worker.end()
-            self._worker = _Worker()
+            self._worker = _Worker(self._warms_up)
