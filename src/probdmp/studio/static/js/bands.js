@@ -7,7 +7,7 @@ import { byId, make } from "./dom.js";
 import { band } from "./session.js";
 import { tab } from "./tabs.js";
 
-const AXES = ["x", "y", "pressure"];
+const AXES = ["x", "y"];
 const TITLES = {
   position: (name) => `Position ${name} [units] over time [s]`,
   velocity: (name) => `Velocity ${name} [units/s] over time [s]`,
@@ -25,11 +25,15 @@ let shownTab = null;
 
 const column = (rows, d) => rows.map((row) => row[d]);
 
-/** The quantity of the tab, as (horizontal values, means, stds). */
-function quantity(shown) {
-  if (tab === "forcing") return [shown.forcing.phase, shown.forcing.mean, shown.forcing.std];
+/** What the tab shows: a title, horizontal values, means and stds of each chart. */
+function panels(shown) {
   const of = tab === "position" ? shown.path : shown[tab];
-  return [shown.times, of.mean, of.std];
+  const across = tab === "forcing" ? of.phase : shown.times;
+  const order = across[0] > across.at(-1) ? (values) => [...values].reverse() : (values) => values; // a phase that decays
+  const axes = of.mean[0].map((_, d) => [TITLES[tab](AXES[d]), column(of.mean, d), column(of.std, d)]);
+  const felt = tab === "position" ? Object.entries(shown.channels ?? {}) : [];
+  const channels = felt.map(([name, { mean, std }]) => [`${name} over time [s]`, mean.flat(), std.flat()]);
+  return [...axes, ...channels].map(([title, mean, std]) => ({ title, across: order(across), mean: order(mean), std: order(std) }));
 }
 
 function clear() {
@@ -53,21 +57,16 @@ function draw() {
     byId("charts").append(make("p", { class: "said", text: "Bands over time appear here, as soon as something is taught." }));
     return;
   }
-  const [across, means, stds] = quantity(shown);
-  const size = means[0].length;
-  if (charts.length !== size) {
+  const wanted = panels(shown);
+  if (charts.length !== wanted.length) {
     clear();
     byId("charts").replaceChildren();
-    for (let d = 0; d < size; d++) {
-      charts.push(makeChart(byId("charts"), { title: TITLES[tab](AXES[d] ?? d + 1), series: LINES, between: [2, 1] }));
-    }
+    charts = wanted.map(({ title }) => makeChart(byId("charts"), { title, series: LINES, between: [2, 1] }));
   }
-  for (let d = 0; d < size; d++) {
-    const [mean, std] = [column(means, d), column(stds, d)];
-    const edge = (side) => mean.map((value, k) => value + 2 * side * std[k]);
-    const order = across[0] > across.at(-1) ? (values) => [...values].reverse() : (values) => values; // a phase that decays
-    charts[d].set([across, edge(-1), edge(1), mean].map(order));
-  }
+  wanted.forEach(({ across, mean, std }, k) => {
+    const edge = (side) => mean.map((value, i) => value + 2 * side * std[i]);
+    charts[k].set([across, edge(-1), edge(1), mean]);
+  });
 }
 
 export function startBands() {

@@ -2,7 +2,7 @@
 
 import { on } from "./bus.js";
 import { colour, onScheme } from "./colours.js";
-import { byId, setText } from "./dom.js";
+import { byId } from "./dom.js";
 import { fitCanvas, HEIGHT, toPixels, WIDTH } from "./geometry.js";
 import { band, selected, session, strokesOf } from "./session.js";
 
@@ -79,9 +79,9 @@ function describe(shown, strokes) {
 }
 
 const OVERLAYS = {
-  recorded: { color: "--ink", width: 1, dash: [2, 4] },
-  filtered: { color: "--muted", width: 2, dash: [7, 4] },
-  smoothed: { color: "--accent", width: 2.5 },
+  smoothed: { color: "--tube-edge", width: 6 },
+  filtered: { color: "--muted", width: 2, dash: [7, 5] },
+  recorded: { color: "--ink", width: 1.75, dash: [1, 4] },
 };
 
 function drawOverlay(context, scale) {
@@ -98,21 +98,21 @@ export function drawPaper() {
   const strokes = strokesOf(selected());
   if (!shown && !strokes.length && session.mode === "teach") drawWish(context, scale);
   if (shown) drawTube(context, shown.tube, scale);
-  for (const { points } of strokes) {
+  const isReplay = overlay !== null && session.mode === "replay";
+  for (const { points } of isReplay ? [] : strokes) {
     const look = { color: colour("--ink"), width: 1.25, alpha: shown ? 0.2 : 0.75 };
     stroke(context, points.map(([, x, y]) => [x, y]), scale, look);
   }
   if (shown) {
-    stroke(context, shown.path.mean, scale, { color: colour("--accent"), width: 2.5 });
+    stroke(context, shown.path.mean, scale, { color: colour("--accent"), width: isReplay ? 1 : 2.5, alpha: isReplay ? 0.5 : 1 });
     drawEnds(context, shown.path.mean, scale);
   }
-  if (overlay && session.mode === "replay") drawOverlay(context, scale);
-  byId("legend").hidden = !(overlay?.smoothed && session.mode === "replay");
+  if (isReplay) drawOverlay(context, scale);
+  byId("legend").hidden = !(isReplay && overlay.smoothed);
   byId("paper").setAttribute("aria-label", describe(shown, strokes));
 }
 
 export function startPaper() {
-  setText(byId("legend"), "··· recorded   – – filtered   — smoothed");
   on("changed mode", drawPaper);
   on("band", measureBand);
   on("compared", (message) => setOverlay(message));

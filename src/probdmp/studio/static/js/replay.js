@@ -3,7 +3,7 @@
 import { show } from "./board.js";
 import { on } from "./bus.js";
 import { byId, setChoices, setText } from "./dom.js";
-import { session, setMode } from "./session.js";
+import { selected, session, setMode } from "./session.js";
 import { send } from "./socket.js";
 import { pointAt } from "./streams.js";
 
@@ -17,10 +17,11 @@ function recordings() {
   return [...imported, ...strokes];
 }
 
-/** What the server is told of the recording that is chosen. */
-function chosen() {
-  const { label, index, imported } = JSON.parse(byId("recording").value || "{}");
-  return imported ? { label: "imported", index } : { label, index };
+/** Asks for the recording that is chosen; its letter is selected, so that the canvas shows what it is compared with. */
+function ask(type) {
+  const { label, index, imported } = JSON.parse(byId("recording").value);
+  if (label !== selected() && session.state.labels.some((one) => one.name === label)) send("select", { label });
+  send(type, { label: imported ? "imported" : label, index });
 }
 
 function scrubTo(k) {
@@ -49,7 +50,7 @@ export function startReplay() {
     scrub.value = scrub.max;
     scrubTo(message.times.length - 1);
   });
-  byId("replay").addEventListener("click", () => send("replay", chosen()));
-  byId("compare").addEventListener("click", () => send("compare", chosen()));
+  byId("replay").addEventListener("click", () => ask("replay"));
+  byId("compare").addEventListener("click", () => ask("compare"));
   byId("scrub").addEventListener("input", (event) => replayed && scrubTo(Number(event.target.value)));
 }

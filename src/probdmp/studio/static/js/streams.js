@@ -2,6 +2,7 @@
 
 import { on } from "./bus.js";
 import { makeChart } from "./chart.js";
+import { makeCompared } from "./compared.js";
 import { onScheme } from "./colours.js";
 import { byId, make, setText } from "./dom.js";
 import { band } from "./session.js";
@@ -16,6 +17,7 @@ let threshold = 1;
 let duration = 1;
 let seen = empty();
 let charts = [];
+let compared = null; // shown in the place of streams, if it was asked for last
 let tally = { first: 0, frames: 0, dropped: 0, last: null };
 let asked = false;
 
@@ -34,6 +36,10 @@ function build() {
   clear();
   const place = byId("charts");
   place.replaceChildren();
+  if (compared) {
+    charts = makeCompared(place, compared);
+    return;
+  }
   const xRange = () => [0, Math.max(duration, seen.times.at(-1) ?? 0)];
   charts = [
     makeChart(place, {
@@ -52,7 +58,7 @@ function build() {
 }
 
 function draw() {
-  if (tab !== "live" || !charts.length) return;
+  if (tab !== "live" || !charts.length || compared) return;
   charts[0].set([seen.times, seen.times.map(() => threshold), seen.testRatio]);
   charts[1].set([seen.times, seen.logLikelihood]);
   charts[2].set([seen.times, ...names.map((_, d) => seen.contributions.map((row) => finite(row[d])))]);
@@ -89,14 +95,19 @@ function add(frame) {
   refresh();
 }
 
+function open() {
+  if (tab === "live") build();
+  else showTab("live");
+}
+
 function begin(message) {
   names = message.names ?? names;
   threshold = message.threshold ?? 1;
   duration = message.duration ?? 1;
+  compared = null;
   seen = empty();
   tally = { first: 0, frames: 0, dropped: 0, last: null };
-  if (tab === "live") build();
-  else showTab("live");
+  open();
 }
 
 /** How many frames came since playing began, how many were left out, and for how long (ms): read by benchmarks/studio.py. */
@@ -104,6 +115,10 @@ export const tallied = () => ({ ...tally });
 
 /** Points at a moment of a replay. */
 export function pointAt(time) {
+  if (compared) {
+    compared = null;
+    open();
+  }
   for (const chart of charts) chart.point(time);
 }
 
@@ -120,6 +135,10 @@ export function startStreams() {
       contributions: message.contributions,
     };
     draw();
+  });
+  on("compared", (message) => {
+    compared = message;
+    open();
   });
   on("tab", () => (tab === "live" ? build() : clear()));
   onScheme(() => charts.forEach((chart) => chart.redraw()));

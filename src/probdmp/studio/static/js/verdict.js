@@ -10,7 +10,7 @@ function card(kind, headline, rows = [], more = []) {
   place.dataset.kind = kind;
   const known = rows.filter(([, value]) => value !== null && value !== undefined && value !== "");
   place.replaceChildren(
-    make("p", { class: "headline" }, make("span", { class: "sign", "aria-hidden": "true", text: SIGNS[kind] }), headline),
+    make("p", { class: "headline" }, ...(SIGNS[kind] ? [make("span", { class: "sign", "aria-hidden": "true", text: SIGNS[kind] })] : []), headline),
     make("dl", {}, ...known.flatMap(([name, value]) => [make("dt", { text: name }), make("dd", { text: value })])),
     ...more,
   );
