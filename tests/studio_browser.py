@@ -40,7 +40,7 @@ class Studio:
             assert time.monotonic() < end, f"not so within {LONG / 1000:g} s: {condition}"
             self.page.wait_for_timeout(15)
 
-    def draw(self, shape: Any = loop, shift: float = 0.0, samples: int = 45) -> None:
+    def draw(self, shape: Any = loop, shift: float = 0.0, samples: int = 32) -> None:
         """A stroke on the canvas, by the mouse."""
         box = self.page.locator("#ink").bounding_box()
         places = [shape(k / (samples - 1), shift) for k in range(samples)]

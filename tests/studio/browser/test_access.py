@@ -63,7 +63,7 @@ def test_it_fits_the_screen(open_studio: Callable[..., Studio], server: Any, wid
         assert canvas["y"] + canvas["height"] <= height
 
 
-def test_a_finger_draws(open_studio: Callable[..., Studio], server: Any) -> None:
+def test_a_finger_draws_and_its_pressure_is_learned(open_studio: Callable[..., Studio], server: Any) -> None:
     studio = open_studio(server, viewport={"width": 390, "height": 844}, has_touch=True)
     box = studio.page.locator("#ink").bounding_box()
     devtools = studio.page.context.new_cdp_session(studio.page)
@@ -72,12 +72,17 @@ def test_a_finger_draws(open_studio: Callable[..., Studio], server: Any) -> None
         points = [{"x": box["x"] + at[0], "y": box["y"] + at[1], "force": 0.3 + at[0] / 1000}] if at else []
         devtools.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
 
-    touch("touchStart", 80, 60)
-    for k in range(30):
-        touch("touchMove", 80 + 5 * k, 60 + 4 * k)
-        studio.page.wait_for_timeout(8)
-    touch("touchEnd")
-    studio.until("document.querySelectorAll('#strokes li').length === 1")
+    for n in range(2):
+        touch("touchStart", 80, 60)
+        for k in range(30):
+            touch("touchMove", 80 + 5 * k, 60 + (4 - n) * k)
+            studio.page.wait_for_timeout(8)
+        touch("touchEnd")
+        studio.until(f"document.querySelectorAll('#strokes li').length === {n + 1}")
+    studio.page.click("#open-model")
+    studio.page.check("#use_pressure")
+    studio.page.keyboard.press("Escape")
+    studio.page.wait_for_selector("#charts figcaption:has-text('pressure over time')")
 
 
 def test_what_happens_is_said_to_those_who_do_not_see_it(studio: Studio) -> None:

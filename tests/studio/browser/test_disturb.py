@@ -28,6 +28,18 @@ def test_a_held_pen_is_noticed_in_time(studio: Studio) -> None:
     assert page.inner_text("#hint").startswith("It noticed.")
 
 
+def test_a_pen_that_is_pulled_away_is_noticed(studio: Studio) -> None:
+    studio.use_example()
+    studio.mode("Play")
+    studio.page.select_option("#pointer-mode", "push")
+    studio.page.click("#play")
+    studio.until("studio.lastFrame()?.time > 0.2")
+    studio.page.locator("#ink").hover(position={"x": 20, "y": 20})
+    studio.page.mouse.down()
+    assert "off the path" in studio.wait_for_verdict("failed")["text"]
+    studio.page.mouse.up()
+
+
 def test_undisturbed_it_is_as_taught(studio: Studio) -> None:
     studio.use_example()
     studio.mode("Play")

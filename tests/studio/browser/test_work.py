@@ -111,6 +111,19 @@ def test_a_page_that_is_loaded_again_is_the_same_session(studio: Studio) -> None
     studio.page.wait_for_selector("#teach-play:enabled")
 
 
+def test_a_session_that_is_opened_twice_stays_with_the_newer_page(studio: Studio) -> None:
+    studio.teach(strokes=2)
+    held = studio.page.evaluate("sessionStorage.getItem('session')")
+    newer = studio.page.context.new_page()
+    newer.add_init_script(f"sessionStorage.setItem('session', '{held}')")
+    newer.goto(studio.page.url)
+    newer.wait_for_selector('.count:text-is("2 strokes, learned")')
+    studio.page.wait_for_selector("#banner:has-text('open in another tab')")
+    studio.page.click("#banner button")
+    newer.wait_for_selector("#banner:has-text('open in another tab')")
+    assert studio.page.is_hidden("#banner")
+
+
 def test_a_server_that_was_started_again_is_taught_again(open_studio: Callable[..., Studio], own_server: Any) -> None:
     studio = open_studio(own_server)
     studio.teach(strokes=3)

@@ -10,10 +10,13 @@ let outcome = null; // of the last execution: "failed" or "fine"
 let traced = false;
 let learning = false;
 
+/** A single letter is spoken with its article: an a, a b. */
+const withArticle = (name) => (/^[a-z]$/i.test(name) ? `${/[aefhilmnorsx]/i.test(name) ? "an" : "a"} ${name}` : name);
+
 function teach() {
   const strokes = strokesOf(selected()).length;
   const name = selected();
-  if (!strokes) return `Draw an ${name}, three times.`.replace(/ an (?![aefhilmnorsx]\b)/i, " a ");
+  if (!strokes) return `Draw ${withArticle(name)}, three times.`;
   if (strokes < ENOUGH) return ENOUGH - strokes === 1 ? "Once more." : "Again, twice more: it learns how you vary.";
   if (!band()) return learning ? "Learning …" : "Draw it once more.";
   return "It knows the movement. Press Play.";

@@ -13,8 +13,13 @@ export function fitting(points) {
   return points.length <= MOST ? points : fitting(points.filter((_, k) => k % 2 === 0));
 }
 
-/** Mice report 0.5 whatever happens; only what varies is pressure. */
-const pressureOf = (event) => (event.pointerType !== "mouse" && event.pressure > 0 && event.pressure !== 0.5 ? event.pressure : null);
+/** Mice report 0.5 whatever happens. */
+const pressureOf = (event) => (event.pointerType === "mouse" ? null : rounded(event.pressure, 4));
+
+/** Without pressure where it never varied: then the device does not feel it. */
+export function felt(points) {
+  return points.some((point) => point[3] !== points[0][3]) ? points : points.map(([t, x, y]) => [t, x, y, null]);
+}
 
 /**
  * Follows one pointer at a time on `surface`: begin(points, event), then move(new points, event), then end(all points, event).

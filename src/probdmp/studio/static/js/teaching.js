@@ -3,7 +3,7 @@
 import { show } from "./board.js";
 import { emit, on } from "./bus.js";
 import { byId, setChoices, setText } from "./dom.js";
-import { fitting, followPointer } from "./ink.js";
+import { felt, fitting, followPointer } from "./ink.js";
 import { band, selected, session, setMode } from "./session.js";
 import { send } from "./socket.js";
 
@@ -46,7 +46,7 @@ function end(points) {
   show({ ink: [] });
   if (points.length < FEWEST) return; // a tap
   performance.mark("stroke");
-  send("stroke", { label: selected(), points: fitting(points) });
+  send("stroke", { label: selected(), points: felt(fitting(points)) });
 }
 
 /** True if `begin` and the rest belong to teaching; playing has its own pointer. */
@@ -56,7 +56,7 @@ export function startTeaching() {
   byId("teach-play").addEventListener("click", () => {
     setMode("play");
     byId("play").click();
-    byId("hold").focus();
+    byId("play").focus();
   });
   byId("try-example").addEventListener("click", () => {
     send("example", { name: session.state.examples[0] });
