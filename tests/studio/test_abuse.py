@@ -19,7 +19,9 @@ from probdmp.demonstrations import Demonstration, synthetic_arm_movements
 from probdmp.errors import InputError
 from probdmp.studio.limits import LARGEST_MESSAGE, MOST_LABELS, MOST_POINTS, MOST_SESSIONS, MOST_SOCKETS, MOST_STROKES
 from probdmp.studio.outbox import MOST_WAITING, Outbox
+from probdmp.studio.room import Room
 from probdmp.studio.session import Session
+from probdmp.studio.sessions import Sessions
 from probdmp.studio.workers import Workers
 
 LINE = [[0.01 * k, k, 2 * k, None] for k in range(30)]
@@ -412,9 +414,15 @@ def test_work_that_takes_too_long_is_ended_and_the_next_goes_on():
     asyncio.run(work())
 
 
-def test_connecting_without_end_is_no_session_each(studio):
-    for _ in range(MOST_SESSIONS // 4):
-        with connect(f"ws://{studio.address}/ws"):
-            pass
-    with studio.page() as page:
-        assert page.state()
+def test_connecting_without_end_makes_no_session_each():
+    """Those that were left are forgotten, the longest left first."""
+
+    async def come_and_go():
+        sessions = Sessions(lambda name: Room(Session(name), Workers()))
+        first, _ = sessions.enter(None)
+        for _ in range(3 * MOST_SESSIONS):
+            sessions.leave(sessions.enter(None)[0])
+        assert len(sessions) <= MOST_SESSIONS
+        assert sessions.find(first.session.name) is first  # its page is still there
+
+    asyncio.run(come_and_go())

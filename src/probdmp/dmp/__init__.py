@@ -7,7 +7,7 @@ from probdmp.dmp.primitive import Primitive, task_for
 from probdmp.dmp.state_space import control_inputs, linear_gaussian_model, step_count
 from probdmp.dmp.task import Task, demonstrated_tasks, stack_tasks, take_tasks, unstack_tasks
 from probdmp.dmp.variation import PathDistribution, Variation
-from probdmp.dmp.via_points import ViaPoint, condition_primitive, via_points_at
+from probdmp.dmp.via_points import ViaPoint, condition_primitive
 
 __all__ = [
     "PUBLISHED",
@@ -29,5 +29,4 @@ __all__ = [
     "take_tasks",
     "task_for",
     "unstack_tasks",
-    "via_points_at",
 ]

@@ -21,10 +21,7 @@ from probdmp.dmp.variation import Variation
 from probdmp.errors import InputError, InputTypeError
 from probdmp.gaussian import observe, unit_belief
 
-__all__ = ["ViaPoint", "condition_primitive", "via_points_at", "with_signals", "with_variation"]
-
-PASSING = 0.01
-"""Standard deviation of the distance at which an execution passes a via-point, as a fraction of the range."""
+__all__ = ["ViaPoint", "condition_primitive", "with_signals", "with_variation"]
 
 ViaPoint = tuple[float, ArrayLike, ArrayLike]
 """Time, seconds of the learned duration; position, (D,), data units, NaN where free; std, a number or (D,), data units."""
@@ -60,29 +57,6 @@ def condition_primitive(primitive: Primitive, points: Sequence[ViaPoint]) -> Pri
     of_channels = (primitive.channel_names, signals.forcing_precisions[d:], signals.ranges[d:])
     varied = with_signals(primitive, shifted, both, residuals, *of_channels)
     return varied.with_signal_noise(signals.observation_variances, signals.forcing_precisions)
-
-
-def via_points_at(
-    primitive: Primitive, points: Sequence[tuple[float, ArrayLike]], start: ArrayLike | None = None
-) -> list[ViaPoint]:
-    """Via-points of an execution that starts somewhere else than was learned, as `condition_primitive` takes them.
-
-    Parameters
-    ----------
-    points : (part of the duration, above 0 and up to 1; position, (D,), data units) each; an execution passes them within
-        `PASSING` of the range.
-    start : (D,) array, data units, where the execution starts; as learned unless given.
-    """
-    shape = (primitive.n_dof,)
-    placed: list[ViaPoint] = []
-    begins = primitive.start if start is None else check_array(start, "start", shape)
-    for part, position in points:
-        share = check_number(part, "the part of the duration at a via-point")
-        if not 0 < share <= 1:
-            raise InputError("a part of the duration above 0 and up to 1 at a via-point", f"{share:g}")
-        there = check_array(position, "the position of a via-point", shape, missing=True)
-        placed.append((share * primitive.duration, there - begins + primitive.start, PASSING * primitive.ranges))
-    return placed
 
 
 def with_signals(

@@ -18,12 +18,12 @@ MOST_SAMPLES = 40
 def log_densities_so_far(
     library: Mapping[str, ProbabilisticDMP], drawn: Demonstration, is_complete: bool = False
 ) -> dict[str, float]:
-    """Log density per sample of the positions drawn so far under each movement from the same start, nats.
+    """Log density per sample of the positions drawn so far under each movement, wherever it is drawn, nats.
 
     Parameters
     ----------
     library : learned movements by label; those of other degrees of freedom are left out.
-    drawn : from its first sample on.
+    drawn : from its first sample on, which was measured.
     is_complete : whether it has ended, so that its duration is known; else each movement takes the tempo that suits it best.
 
     """
@@ -34,7 +34,8 @@ def log_densities_so_far(
         primitive = learned.primitive_
         if primitive.n_dof != drawn.n_dof:
             continue
+        moved = Demonstration(seen.positions - seen.positions[0] + primitive.start, seen.dt)  # wherever it is drawn
         durations = [drawn.duration] if is_complete else [tempo * primitive.duration for tempo in TEMPOS]
-        tasks = [task_of_recording(primitive, seen, duration=duration) for duration in durations]
-        scores[label] = float(score_recordings(primitive, tasks, [seen] * len(tasks)).max()) / seen.n_samples
+        tasks = [task_of_recording(primitive, moved, duration=duration) for duration in durations]
+        scores[label] = float(score_recordings(primitive, tasks, [moved] * len(tasks)).max()) / seen.n_samples
     return scores

@@ -5,6 +5,7 @@ from probdmp.execution.execution_step import ExecutionStep, Judgement
 from probdmp.execution.feedback_gains import feedback_gains
 from probdmp.execution.movement_change import MovementChange, movement_change
 from probdmp.execution.online import Monitor, Observed, OnlineExecution
+from probdmp.execution.passing import via_points_for
 from probdmp.execution.plain_sensors import sensors_as_plain, sensors_from_plain
 from probdmp.execution.planar_arm import PlanarArm, planar_arm_sensor
 from probdmp.execution.readings import readings_of, recording_of_readings
@@ -73,4 +74,5 @@ __all__ = [
     "state_sensor",
     "task_of_recording",
     "track_recording",
+    "via_points_for",
 ]

@@ -74,7 +74,7 @@ def _taught(room: Room, label: str) -> None:
 async def _add_label(room: Room, message: Message) -> None:
     label = name_of(message)
     room.session.add_label(label)
-    room.session.selected = label
+    room.session.select(label)
     room.show_state()
 
 
@@ -92,8 +92,8 @@ async def _delete_label(room: Room, message: Message) -> None:
 
 async def _select(room: Room, message: Message) -> None:
     label = name_of(message)
-    room.session.movement(label)
-    room.session.selected, room.session.task = label, TaskWish()
+    room.session.select(label)
+    room.session.task = TaskWish()
     room.show_state()
     await room.show_band(label)
 

@@ -50,11 +50,11 @@ def _python(session: Session) -> list[str]:
         f"movement = {movement}.fit(demonstrations)",
         f"detector = FailureDetector({settings.alpha:g}).fit(movement, demonstrations)",
     ]
-    if session.task.via:
+    if session.task.via:  # the detector knows the movement as taught, not through via-points
         via = [(phase, point.tolist()) for phase, point in session.task.via]
-        lines.insert(1, "from probdmp.dmp import via_points_at")
-        points = f"via_points_at(movement.primitive_, {via!r}, {_literal(session.task.start)})"
-        lines.append(f"movement = movement.condition({points})")
+        lines[1:1] = ["from probdmp.dmp import task_for", "from probdmp.execution import via_points_for"]
+        lines.append(f"task = task_for(movement.primitive_{', ' if task else ''}{task})")
+        lines.append(f"movement = movement.condition(via_points_for(movement.primitive_, task, {via!r}))")
     lines += [
         f"planned = movement.rollout({task})",
         "verdicts = detector.verdicts(demonstrations)",

@@ -18,7 +18,7 @@ from probdmp.io.formats import FORMATS
 from probdmp.studio import jobs
 from probdmp.studio.commands import commands_of
 from probdmp.studio.fields import name_of
-from probdmp.studio.limits import CANVAS, LARGEST_UPLOAD, LONGEST_NAME
+from probdmp.studio.limits import CANVAS, LARGEST_UPLOAD, LONGEST_NAME, LONGEST_STROKE
 from probdmp.studio.room import Room
 
 __all__ = ["DOWNLOADS", "Import", "add_contents", "add_file", "download", "received"]
@@ -112,6 +112,7 @@ def _shown(recording: Demonstration, stem: str) -> Demonstration:
     if recording.n_dof != 2:
         hint = "The studio shows paths in the plane; probdmp fit and probdmp monitor take any."
         raise DataFileError("recordings of two degrees of freedom", f"{recording.n_dof} ({', '.join(recording.names)})", hint)
+    _check_duration(recording.duration)
     return replace(recording, label=_label(recording.label, stem), names=("x", "y"), units="")
 
 
@@ -119,7 +120,14 @@ def _checked(label: str, learned: ProbabilisticDMP) -> ProbabilisticDMP:
     if learned.primitive_.n_dof != 2:
         hint = "The studio shows paths in the plane; probdmp rollout and probdmp monitor take any."
         raise DataFileError("a model of two degrees of freedom", f"{learned.primitive_.n_dof} of {label!r:.60}", hint)
+    _check_duration(learned.primitive_.duration)
     return learned
+
+
+def _check_duration(seconds: float) -> None:
+    if seconds > LONGEST_STROKE:
+        hint = "A time in milliseconds? The command line takes longer ones."
+        raise DataFileError(f"movements of at most {LONGEST_STROKE:g} s", f"{seconds:g} s", hint)
 
 
 async def download(room: Room, name: str) -> bytes:

@@ -19,7 +19,7 @@ from probdmp.studio.frames import PLAYING, TRACING, frame_of
 from probdmp.studio.learner import Learner
 from probdmp.studio.limits import DT, FRAME_RATE
 from probdmp.studio.playing import Playing, faulty
-from probdmp.studio.session import Session
+from probdmp.studio.session import Session, TaskWish
 from probdmp.studio.tracing import Tracing
 from probdmp.studio.workers import Workers
 
@@ -31,7 +31,7 @@ class Room:
 
     def __init__(self, session: Session, workers: Workers) -> None:
         self.session, self.workers = session, workers
-        self.learner = Learner(session, workers, self.show_band)
+        self.learner = Learner(session, workers, self.show_learned)
         self.playing: Playing | None = None
         self.tracing: Tracing | None = None
         self._show: asyncio.Task[None] | None = None
@@ -57,8 +57,17 @@ class Room:
         movement = self.session.movements.get(label)
         if movement is None or movement.learned is None:
             return
-        band = await asyncio.to_thread(band_view, self.session, label, movement)
+        band = await asyncio.to_thread(band_view, label, movement, self.session.task_of(label))
         self.session.send(band, f"band {label}")
+
+    async def show_learned(self, label: str) -> None:
+        """The same of what was learned just now; it may be none for which the task of the page makes sense."""
+        try:
+            await self.show_band(label)
+        except ProbDMPError as error:
+            self.session.task = TaskWish()
+            self.session.send({"type": "error", **views.error_view(error)})
+            await self.show_band(label)
 
     def show_state(self) -> None:
         """Send all that the page needs to know."""
@@ -68,7 +77,7 @@ class Room:
         """Begin to play the selected movement."""
         self.stop()
         label, learned = await self._ready(None)
-        executed, task = asked_of(self.session, learned)
+        executed, task = asked_of(self.session.task, learned)
         detector = await self.detector_of(label, executed)
         prepared = (label, executed, task, detector, fault, onset, speed)
         self.playing = playing = await asyncio.to_thread(self._prepared, *prepared)

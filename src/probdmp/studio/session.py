@@ -129,7 +129,17 @@ class Session:
         movement = self.add_label(label)
         movement.strokes.extend(strokes)
         movement.version += 1
-        self.selected = label
+        self.select(label)
+
+    def select(self, label: str) -> None:
+        """Speak of another movement from now on, executed as learned."""
+        self.movement(label)
+        if label != self.selected:
+            self.selected, self.task = label, TaskWish()
+
+    def task_of(self, label: str) -> TaskWish:
+        """What the page asks of executions of a label: nothing but of the selected one."""
+        return self.task if label == self.selected else TaskWish()
 
     def add_imported(self, executions: list[Demonstration]) -> None:
         """Recorded executions to be replayed."""
@@ -146,7 +156,7 @@ class Session:
         for label, learned in library.items():
             movement = self.add_label(label)
             movement.learned, movement.before, movement.given_detector = learned, None, detector
-            self.selected = label
+            self.select(label)
 
     def recording(self, label: str, index: int) -> tuple[str | None, Demonstration]:
         """A stroke of a label, or an execution from a file, and the label of the movement that it is one of."""
@@ -173,7 +183,7 @@ class Session:
         del self.movements[label]
         self.detectors.pop(label, None)
         if self.selected == label:
-            self.selected = next(iter(self.movements), None)
+            self.selected, self.task = next(iter(self.movements), None), TaskWish()
 
     def all_strokes(self) -> Mapping[str, list[Demonstration]]:
         """Demonstrations by label, of labels that have any."""

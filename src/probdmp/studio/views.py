@@ -12,7 +12,7 @@ from probdmp.io.plain_values import plain
 from probdmp.plotting.trajectories import evenly_spaced
 from probdmp.studio.commands import commands_of
 from probdmp.studio.limits import SIMULATED
-from probdmp.studio.session import Session
+from probdmp.studio.session import Session, TaskWish
 from probdmp.studio.settings import CHOICES
 from probdmp.studio.strokes import EXAMPLES
 
@@ -45,7 +45,7 @@ def state_view(session: Session) -> dict[str, Any]:
             "faults": list(FAULTS),
             "imported": [{"name": f"execution {k + 1}", "label": d.label} for k, d in enumerate(session.imported)],
             "calibration": calibration_view(session),
-            "task": task_view(session),
+            "task": task_view(session.task),
             "commands": commands_of(session),
         }
     )
@@ -58,9 +58,8 @@ def stroke_view(stroke: Demonstration) -> dict[str, Any]:
     return {"points": points, "duration": stroke.duration}
 
 
-def task_view(session: Session) -> dict[str, Any]:
+def task_view(wish: TaskWish) -> dict[str, Any]:
     """What is asked of executions."""
-    wish = session.task
     via = [[phase, *point.tolist()] for phase, point in wish.via]
     return plain({"start": wish.start, "goal": wish.goal, "via": via, "duration": wish.duration})
 

@@ -6,8 +6,7 @@ import signal
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import suppress
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 from typing import Any, TypeVar
 
 from probdmp.errors import InputError
@@ -28,23 +27,24 @@ def _prepare(warms_up: bool) -> None:
 
 
 class _Worker:
-    """One process, known by its number so that it can be ended."""
+    """One process, that can be ended at any time."""
 
     def __init__(self, warms_up: bool) -> None:
         context = get_context("spawn")
         self._executor = ProcessPoolExecutor(1, mp_context=context, initializer=_prepare, initargs=(warms_up,))
-        self._number = self._executor.submit(os.getpid)
+        others = set(active_children())
+        self._ready = self._executor.submit(os.getpid)
+        self._processes = set(active_children()) - others
 
     async def run(self, work: Callable[..., Result], arguments: tuple[Any, ...], seconds: float) -> Result:
-        await asyncio.wrap_future(self._number)  # starting does not count
+        await asyncio.wrap_future(self._ready)  # starting does not count
         return await asyncio.wait_for(asyncio.wrap_future(self._executor.submit(work, *arguments)), seconds)
 
     def end(self) -> None:
         """Now, whatever it is doing."""
         self._executor.shutdown(wait=False, cancel_futures=True)
-        if self._number.done() and not self._number.cancelled() and self._number.exception() is None:
-            with suppress(ProcessLookupError):
-                os.kill(self._number.result(), signal.SIGKILL)
+        for process in self._processes:
+            process.kill()
 
 
 class Workers:
