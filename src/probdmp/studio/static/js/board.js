@@ -5,6 +5,7 @@ import { colour } from "./colours.js";
 import { byId } from "./dom.js";
 import { fitCanvas, toPixels } from "./geometry.js";
 import { stroke } from "./paper.js";
+import { session } from "./session.js";
 
 const board = { ink: [], trail: [], frame: null, alarm: null, pull: null, mark: null };
 let asked = false;
@@ -73,6 +74,7 @@ function draw() {
 export function startBoard() {
   on("playing", () => show({ trail: [], ink: [], frame: null, alarm: null, mark: null }));
   on("frame", (frame) => {
+    if (frame.kind === "playing" && session.mode !== "play") return; // it is being stopped
     if (frame.kind === "playing") board.trail.push(frame.measured.slice(0, 2));
     if (frame.kind === "playing" && frame.failed) board.alarm ??= frame.measured;
     show({ frame });

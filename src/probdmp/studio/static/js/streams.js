@@ -62,7 +62,8 @@ function draw() {
   charts[0].set([seen.times, seen.times.map(() => threshold), seen.testRatio]);
   charts[1].set([seen.times, seen.logLikelihood]);
   charts[2].set([seen.times, ...names.map((_, d) => seen.contributions.map((row) => finite(row[d])))]);
-  setText(byId("tally"), tally.dropped ? `${tally.dropped} of ${tally.frames + tally.dropped} moments left out: the connection is slow.` : "");
+  const isSlow = tally.dropped > 0.1 * tally.frames;
+  setText(byId("tally"), isSlow ? `${tally.dropped} of ${tally.frames + tally.dropped} moments left out: the connection is slow.` : "");
 }
 
 function refresh() {

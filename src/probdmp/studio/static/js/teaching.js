@@ -10,8 +10,10 @@ import { send } from "./socket.js";
 const FEWEST = 3;
 
 let waiting = []; // samples of a trace that were not sent yet
+let asked = false; // whether they will be, at the next frame of the screen
 
 function sendTrace() {
+  asked = false;
   if (waiting.length) send("trace", { points: waiting });
   waiting = [];
 }
@@ -30,8 +32,9 @@ function begin(points) {
 
 function move(fresh) {
   if (session.mode === "trace") {
-    if (!waiting.length) requestAnimationFrame(sendTrace);
     waiting.push(...fresh);
+    if (!asked) requestAnimationFrame(sendTrace);
+    asked = true;
   }
   show({});
 }
