@@ -59,6 +59,20 @@ def test_modules_are_small() -> None:
     assert max(lines.values()) <= 350, max(lines, key=lines.__getitem__)
 
 
+def test_the_routes_of_the_studio_are_short() -> None:
+    assert len((ROOT / "studio" / "routes.py").read_text().splitlines()) <= 150
+
+
+def test_the_studio_computes_nothing_itself() -> None:
+    """Numbers are the library's: of NumPy it takes what packs and seeds arrays."""
+    allowed = {"array", "asarray", "stack", "concatenate", "column_stack", "empty", "isnan", "sqrt", "clip"}
+    allowed |= {"nan", "float64", "random", "ndarray"}
+    for path in (ROOT / "studio").glob("*.py"):
+        nodes = [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Attribute)]
+        used = {node.attr for node in nodes if isinstance(node.value, ast.Name) and node.value.id == "np"}
+        assert used <= allowed, f"{path.name}: {used - allowed}"
+
+
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_everything_public_is_documented(path: Path) -> None:
     tree = ast.parse(path.read_text())

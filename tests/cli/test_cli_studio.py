@@ -1,5 +1,6 @@
 """`probdmp studio`: where it listens, what it opens, how it ends."""
 
+import json
 import re
 import signal
 import subprocess
@@ -27,12 +28,12 @@ def test_it_says_where_it_is_and_ends_quietly(interruptions):
 
 
 def test_where_others_can_connect_a_token_is_made():
-    command = [sys.executable, "-m", "probdmp", "studio", "--no-browser", "--host", "0.0.0.0"]
+    command = [sys.executable, "-m", "probdmp", "studio", "--no-browser", "--json", "--host", "0.0.0.0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         line = process.stdout.readline()
         process.send_signal(signal.SIGINT)
         process.communicate(timeout=20)
-    assert re.search(r"\?token=[\w-]{20,}", line)
+    assert re.search(r"\?token=[\w-]{20,}$", json.loads(line)["address"])
 
 
 def test_without_its_extra_it_says_what_to_type(run, monkeypatch):

@@ -1,11 +1,13 @@
 """`probdmp studio`: the web app."""
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from probdmp.cli.output import print_line
+from probdmp.cli.options import Json
+from probdmp.cli.output import print_json, print_line
 
 __all__ = ["studio"]
 
@@ -23,12 +25,22 @@ def studio(
         str | None, typer.Option(metavar="TEXT", help="What the page has to bring. Default: random, beyond this machine.")
     ] = None,
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Do not open the page, only say where it is.")] = False,
+    as_json: Json = False,
 ) -> None:
-    """Teach movements with a pen, execute them, disturb them, and see what is noticed: a page in the browser.
+    """Teach, execute and disturb movements in the browser.
 
-    Everything runs on this machine; nothing is sent elsewhere. Ctrl-C ends it. Needs the extra: pip install 'probdmp[studio]'.
+    Draw a letter a few times and see what is learned; play it, hold the pen, and see what is noticed, when and why. In JSON:
+    the address of the page, once it is there. Everything runs on this machine; nothing is sent elsewhere. Ctrl-C ends it. Needs the extra: pip install 'probdmp[studio]'.
     """
     from probdmp.studio import StudioOptions, serve
 
     options = StudioOptions(host, port, token, not no_browser, tuple(files or ()))
-    serve(options, lambda address: print_line(f"The studio is at {address} – Ctrl-C ends it."))
+
+    def announce(address: str) -> None:
+        if as_json:
+            print_json({"address": address})
+        else:
+            print_line(f"The studio is at {address} – Ctrl-C ends it.")
+        sys.stdout.flush()
+
+    serve(options, announce)
