@@ -9,13 +9,20 @@ BENCH := benchmarks/.venv
 SOURCES := $(shell find src -name '*.py')
 GALLERY := $(patsubst examples/%.py,build/gallery/%.png,$(wildcard examples/*.py))
 
-.PHONY: demo test test-numpy test-slow coverage lint types docs gallery n-basis figures results variation detection bench-env bench bench-detection bench-realtime clean
+.PHONY: demo test browser test-numpy test-slow coverage lint types docs gallery n-basis figures results variation detection bench-env bench bench-detection bench-realtime bench-studio clean
 
 demo: $(VENV)/.demo
 	$(BIN)/probdmp demo
 
-test: $(VENV)/.test
+test: $(VENV)/.test browser
 	$(BIN)/python -m pytest -n auto --dist worksteal
+
+# Tests of the studio's page run in Chromium. It is installed where that can be done; elsewhere they are skipped.
+browser:
+	@test -n "$$PROBDMP_CHROMIUM" || command -v chromium >/dev/null || command -v chromium-browser >/dev/null || \
+	command -v google-chrome >/dev/null || ls $${HOME}/.cache/ms-playwright/chromium* >/dev/null 2>&1 || \
+	{ test "$$(id -u)" = 0 && command -v apt-get >/dev/null && apt-get install --yes --no-install-recommends chromium >/dev/null; } || \
+	echo "No Chromium: tests in a browser are skipped. sudo apt-get install chromium, or $(BIN)/playwright install chromium"
 
 # The same laws of filters and steps without the compiled kernels.
 test-numpy: $(VENV)/.test
@@ -79,6 +86,11 @@ bench: $(BENCH)/.ready
 # Control loops at 1 kHz, ten seconds each.
 bench-realtime: $(BENCH)/.ready
 	$(BENCH)/bin/python benchmarks/realtime.py
+
+# The studio in Chromium: how long bands take, frames per second; then its picture in docs/images.
+bench-studio: $(VENV)/.test browser
+	$(BIN)/python benchmarks/studio.py
+	$(BIN)/python benchmarks/studio.py --picture docs/images/studio.png
 
 # benchmarks/detection.md: failure detectors against one another, on the recordings that PROBDMP_RECORDINGS points at.
 bench-detection: $(BENCH)/.ready

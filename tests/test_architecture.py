@@ -11,7 +11,7 @@ import probdmp
 ROOT = Path(probdmp.__file__).parent
 LAYERS = (
     *("errors", "checks", "parameters", "gaussian", "demonstrations", "dmp", "io", "learning", "execution", "detection"),
-    *("evaluation", "estimator", "plotting", "fleet", "cli"),
+    *("evaluation", "estimator", "plotting", "fleet", "studio", "cli"),
 )
 """From the bottom up: a module imports only from names before its own."""
 
@@ -49,14 +49,28 @@ def test_imports_point_downward(path: Path) -> None:
     assert not upward
 
 
-def test_only_the_command_line_imports_the_estimator() -> None:
-    assert {layer_of(p) for p in MODULES if "estimator" in probdmp_imports(p)} <= {"__init__", "estimator", "cli"}
+def test_only_the_command_line_and_the_studio_import_the_estimator() -> None:
+    assert {layer_of(p) for p in MODULES if "estimator" in probdmp_imports(p)} <= {"__init__", "estimator", "studio", "cli"}
 
 
 def test_modules_are_small() -> None:
     lines = {path: len(path.read_text().splitlines()) for path in MODULES}
     assert median(lines.values()) <= 100
     assert max(lines.values()) <= 350, max(lines, key=lines.__getitem__)
+
+
+def test_the_routes_of_the_studio_are_short() -> None:
+    assert len((ROOT / "studio" / "routes.py").read_text().splitlines()) <= 150
+
+
+def test_the_studio_computes_nothing_itself() -> None:
+    """Numbers are the library's: of NumPy it takes what packs and seeds arrays."""
+    allowed = {"array", "asarray", "stack", "concatenate", "column_stack", "empty", "isnan", "sqrt", "clip"}
+    allowed |= {"nan", "float64", "random", "ndarray"}
+    for path in (ROOT / "studio").glob("*.py"):
+        nodes = [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Attribute)]
+        used = {node.attr for node in nodes if isinstance(node.value, ast.Name) and node.value.id == "np"}
+        assert used <= allowed, f"{path.name}: {used - allowed}"
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))

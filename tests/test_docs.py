@@ -69,8 +69,9 @@ def test_every_document_is_in_the_site_and_every_picture_in_a_document() -> None
 
 
 def test_every_picture_is_made_by_a_command() -> None:
-    """By `make figures`, `make n-basis` or `make bench`; those of the gallery by `make gallery`."""
-    makers = "".join((ROOT / name).read_text() for name in ("docs/figures.py", "docs/n_basis.py", "benchmarks/speed_tables.py"))
+    """By `make figures`, `make n-basis`, `make bench` or `make bench-studio`; those of the gallery by `make gallery`."""
+    scripts = ("docs/figures.py", "docs/n_basis.py", "benchmarks/speed_tables.py", "benchmarks/studio.py")
+    makers = "".join((ROOT / name).read_text() for name in scripts)
     assert all(f'"{path.stem}' in makers or f"{path.stem}.png" in makers for path in (ROOT / "docs/images").iterdir())
 
 

@@ -53,9 +53,26 @@ def loaded_after(statement: str) -> set[str]:
 def test_the_core_needs_numpy_alone_until_it_is_used() -> None:
     loaded = loaded_after("import probdmp; [getattr(probdmp, name) for name in probdmp.__all__]")
     assert "numpy" in loaded
-    assert not loaded & {"scipy", "matplotlib", "safetensors", "typer", "rich", "click", "sklearn"}
+    assert not loaded & {
+        "scipy",
+        "matplotlib",
+        "safetensors",
+        "typer",
+        "rich",
+        "click",
+        "sklearn",
+        "starlette",
+        "uvicorn",
+        "websockets",
+    }
 
 
 def test_importing_alone_loads_nothing() -> None:
     assert "numpy" not in loaded_after("import probdmp")
     assert "probdmp.dmp" not in loaded_after("import probdmp.gaussian")
+
+
+def test_the_web_server_is_loaded_by_the_studio_alone_and_only_when_it_serves() -> None:
+    server = {"starlette", "uvicorn", "websockets"}
+    assert not loaded_after("import probdmp.cli.program") & server
+    assert not loaded_after("import probdmp.studio.application, probdmp.studio.routes, probdmp.studio.connection") & server

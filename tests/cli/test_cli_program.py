@@ -13,10 +13,11 @@ import typer
 
 from probdmp import __version__, write_demonstrations
 from probdmp.cli.exit_codes import UsageError, exit_code, message
-from probdmp.cli.output import json_line, plain, printable
+from probdmp.cli.output import json_line, printable
 from probdmp.cli.program import VERBS
 from probdmp.demonstrations import Demonstration
 from probdmp.errors import DataFileError, InputError, MissingExtraError, ModelFileError
+from probdmp.io.plain_values import plain
 
 PROGRAM = (sys.executable, "-m", "probdmp")
 

@@ -1,6 +1,7 @@
 """What a detector may be fitted to, what it refuses, and that a file brings it back as it was."""
 
 import json
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -198,7 +199,7 @@ def test_a_file_brings_the_detector_back(tmp_path, varied, training, chosen, arg
 def test_a_single_primitive_and_its_detector_in_one_file(tmp_path, varied, alone, executions):
     """The same verdicts online."""
     varied["s"].save(tmp_path / "s.probdmp", alone)
-    learned, detector = load(tmp_path / "s.probdmp"), load_detector(tmp_path / "s.probdmp")
+    learned, detector = load(tmp_path / "s.probdmp"), pickle.loads(pickle.dumps(load_detector(tmp_path / "s.probdmp")))
     held = next(d for d in executions["hold"] if d.label == "s")
     verdicts = []
     for primitive, judge in ((varied["s"], alone), (learned, detector)):

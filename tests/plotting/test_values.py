@@ -14,7 +14,7 @@ from probdmp.plotting.executions import plot_filtered_and_smoothed, plot_uncerta
 from probdmp.plotting.forcing import plot_basis, plot_forcing, plot_phase
 from probdmp.plotting.monitoring import Curve, plot_log_likelihoods, plot_monitored_position, plot_test_ratios
 from probdmp.plotting.operating import plot_by_onset, plot_latencies, plot_operating_curve, plot_soon_enough
-from probdmp.plotting.trajectories import QUANTITIES, ellipses, plot_path_tube, plot_rollout
+from probdmp.plotting.trajectories import QUANTITIES, ellipses, evenly_spaced, plot_path_tube, plot_rollout, tube_ellipses
 
 
 def labelled(ax):
@@ -95,6 +95,26 @@ def test_the_forcing_term_has_its_variance(ax, primitive, noise):
     np.testing.assert_allclose(limits(ax.collections[0], times), expected, rtol=1e-6, atol=1e-6)
     assert len(ax.collections) == (2 if noise == "predictive" else 1)
     assert ax.get_ylabel() == "Forcing term of x [mm]"
+
+
+def test_ellipses_of_a_tube_are_those_that_are_drawn():
+    centers = np.array([[1.0, 2.0], [-3.0, 0.5]])
+    covariances = np.array([[[4.0, 1.5], [1.5, 1.0]], [[0.0, 0.0], [0.0, 2.0]]])
+    angles = np.linspace(0, 2 * np.pi, 32)
+    for outline, (x, y, first, second, turn) in zip(
+        ellipses(centers, covariances, 2.0), tube_ellipses(centers, covariances, 2.0), strict=True
+    ):
+        own = np.stack([first * np.cos(angles), second * np.sin(angles)])
+        turned = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]) @ own
+        distances = np.linalg.norm(outline[:, None] - (turned.T + np.array([x, y])), axis=2).min(axis=1)
+        assert distances.max() < 0.25 * max(first, second)  # the next of 32 points
+        np.testing.assert_allclose(np.ptp(outline, axis=0), np.ptp(turned, axis=1), atol=0.02 * max(first, second))
+
+
+def test_samples_are_chosen_evenly_with_both_ends():
+    assert evenly_spaced(5, 200).tolist() == [0, 1, 2, 3, 4]
+    assert evenly_spaced(1000, 3).tolist() == [0, 500, 999]
+    assert evenly_spaced(1, 10).tolist() == [0]
 
 
 def test_ellipses_lie_at_their_distance():

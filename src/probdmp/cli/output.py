@@ -1,16 +1,15 @@
 """What reaches standard output: one JSON document, or lines and tables for people."""
 
 import json
-import math
 import os
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-__all__ = ["json_line", "plain", "print_json", "print_line", "print_table", "printable"]
+__all__ = ["json_line", "print_json", "print_line", "print_table", "printable"]
 
 PIPE_WIDTH = 160
 """Columns where there is no terminal to ask: wide enough for tables not to be squeezed."""
@@ -19,19 +18,10 @@ NUMBER_STARTS = "0123456789-+−±–"
 """With one of these begins what is a number, or stands for one that is not there."""
 
 
-def plain(value: Any) -> Any:
-    """Values that JSON can hold: NumPy's as lists and numbers, NaN and infinities as None."""
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {key: plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    return plain(value.tolist()) if hasattr(value, "tolist") else value
-
-
 def json_line(document: Any) -> str:
     """JSON on one line, with its end."""
+    from probdmp.io.plain_values import plain
+
     return json.dumps(plain(document), allow_nan=False) + "\n"
 
 

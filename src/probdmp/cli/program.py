@@ -26,12 +26,13 @@ from probdmp.cli.report import report
 from probdmp.cli.rollout import rollout
 from probdmp.cli.score import score
 from probdmp.cli.smooth import smooth
+from probdmp.cli.studio import studio
 from probdmp.cli.track import track
 from probdmp.cli.verb import Verb
 
 __all__ = ["app", "main"]
 
-VERBS = (demo, fit, inspect, rollout, track, smooth, monitor, score, evaluate, plot, report, perturb, convert)
+VERBS = (demo, fit, inspect, rollout, track, smooth, monitor, score, evaluate, plot, report, perturb, convert, studio)
 
 EPILOG = (
     "Exit codes: 0 fine, 1 error, 2 usage, 3 bad input data or model file, 4 a failure was detected (monitor), 130 interrupted."

@@ -13,8 +13,10 @@ from probdmp.demonstrations.demonstration import (
 from probdmp.demonstrations.extent import channel_ranges, largest_extent, mean_ranges
 from probdmp.demonstrations.faults import BENIGN, CHANNEL_FAULTS, FAILURE, FAULTS, SENSOR, Fault, fault_named
 from probdmp.demonstrations.letters import LETTERS, WriterVariation, WrittenLetter, synthetic_letters, written_letters
+from probdmp.demonstrations.live_resampling import LiveResampling
 from probdmp.demonstrations.movement_faults import hold
 from probdmp.demonstrations.perturbation import ONSETS, fault_generator, perturb_executions
+from probdmp.demonstrations.placing import Placement, are_within, placement_within
 from probdmp.demonstrations.resampling import channel_from_times, demonstration_from_times, signals_on_phases
 from probdmp.demonstrations.sigma_lognormal import Strokes
 from probdmp.demonstrations.smoothing import SmoothPath, noise_stds, smooth_path, without_noise
@@ -35,12 +37,15 @@ __all__ = [
     "ContactVariation",
     "Demonstration",
     "Fault",
+    "LiveResampling",
+    "Placement",
     "Recording",
     "Recordings",
     "SmoothPath",
     "Strokes",
     "WriterVariation",
     "WrittenLetter",
+    "are_within",
     "as_demonstrations",
     "channel_from_times",
     "channel_ranges",
@@ -52,6 +57,7 @@ __all__ = [
     "mean_ranges",
     "noise_stds",
     "perturb_executions",
+    "placement_within",
     "signals_of",
     "signals_on_phases",
     "smooth_path",

@@ -223,7 +223,7 @@ class FailureDetector(HasParameters):
             raise InputError("the state of a detector with the sensors it was fitted with", f"{state!r:.200}")
         plain = parts.pop("sensors")
         detector = cls(rule=rule)
-        detector.primitives_ = dict(primitives)
+        primitives = detector.primitives_ = dict(primitives)  # one that can be copied and sent elsewhere
         sensors = None if plain is None else sensors_from_plain(plain, next(iter(primitives.values())))
         arrays = {primitive.identity: SensorArray(primitive, sensors) for primitive in primitives.values()}
         detector.sensors_, detector._outputs = sensors, {identity: array.outputs for identity, array in arrays.items()}

@@ -3,7 +3,9 @@
 from probdmp.execution.execution_batch import ExecutionBatch, is_batch, own_batch
 from probdmp.execution.execution_step import ExecutionStep, Judgement
 from probdmp.execution.feedback_gains import feedback_gains
+from probdmp.execution.movement_change import MovementChange, movement_change
 from probdmp.execution.online import Monitor, Observed, OnlineExecution
+from probdmp.execution.passing import via_points_for
 from probdmp.execution.plain_sensors import sensors_as_plain, sensors_from_plain
 from probdmp.execution.planar_arm import PlanarArm, planar_arm_sensor
 from probdmp.execution.readings import readings_of, recording_of_readings
@@ -21,9 +23,11 @@ from probdmp.execution.sensor_array import SensorArray
 from probdmp.execution.sensor_noise import SensorNoise, estimate_sensor_noise
 from probdmp.execution.sensor_reports import SensorCounts, SensorTrack
 from probdmp.execution.sensors import ChannelSensor, LinearSensor, NonlinearSensor, Sensor, default_sensors, state_sensor
+from probdmp.execution.simulated_pen import DISTURBANCES, SimulatedPen, planned_recording
 from probdmp.execution.trajectory import GaussianChannel, GaussianTrajectory, TrackedTrajectory
 
 __all__ = [
+    "DISTURBANCES",
     "ChannelSensor",
     "ExecutionBatch",
     "ExecutionStep",
@@ -32,6 +36,7 @@ __all__ = [
     "Judgement",
     "LinearSensor",
     "Monitor",
+    "MovementChange",
     "NonlinearSensor",
     "Observed",
     "OnlineExecution",
@@ -41,6 +46,7 @@ __all__ = [
     "SensorCounts",
     "SensorNoise",
     "SensorTrack",
+    "SimulatedPen",
     "TrackedTrajectory",
     "check_tasks",
     "default_sensors",
@@ -48,8 +54,10 @@ __all__ = [
     "feedback_gains",
     "filter_recordings",
     "is_batch",
+    "movement_change",
     "own_batch",
     "planar_arm_sensor",
+    "planned_recording",
     "position_covariances",
     "readings_of",
     "recording_of_readings",
@@ -66,4 +74,5 @@ __all__ = [
     "state_sensor",
     "task_of_recording",
     "track_recording",
+    "via_points_for",
 ]

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any, NamedTuple, Protocol, TypeVar
 
+import numpy as np
 from numpy.typing import NDArray
 
 from probdmp.checks import BoolArray, FloatArray
@@ -103,6 +104,14 @@ class ExecutionStep(NamedTuple):
     def channels(self) -> Mapping[str, GaussianChannel]:
         """What the learned channels should read at the next tick, by name, of one time each."""
         return channels_of(self.primitive, self.commanded.mean[None], self.commanded.covariance[None])
+
+    @property
+    def signals(self) -> GaussianChannel:
+        """Desired position of each degree of freedom, then what each learned channel should read, at the next tick: (S,)."""
+        own, d = self.commanded, self.primitive.n_dof
+        means = own.mean[:, POSITION].copy()
+        means[:d] = self.position
+        return GaussianChannel(means, np.sqrt(np.maximum(own.covariance[:, POSITION, POSITION], 0.0)))
 
     @property
     def sensors(self) -> dict[str, SensorTrack]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from probdmp.checks import FloatArray
+from probdmp.checks import FloatArray, IntArray
 from probdmp.execution import GaussianTrajectory
 from probdmp.plotting.panels import Panel
 from probdmp.plotting.style import BAND, MEAN, axis_label, band, legend_beside
@@ -15,7 +15,16 @@ from probdmp.plotting.style import BAND, MEAN, axis_label, band, legend_beside
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["QUANTITIES", "band_panels", "ellipses", "path_panel", "plot_path_tube", "plot_rollout"]
+__all__ = [
+    "QUANTITIES",
+    "band_panels",
+    "ellipses",
+    "evenly_spaced",
+    "path_panel",
+    "plot_path_tube",
+    "plot_rollout",
+    "tube_ellipses",
+]
 
 QUANTITIES = {
     "position": ("positions", "position_stds", ""),
@@ -56,7 +65,7 @@ def plot_path_tube(ax: "Axes", rollout: GaussianTrajectory, covariances: FloatAr
     from matplotlib.collections import PolyCollection
     from scipy.spatial import ConvexHull
 
-    chosen = np.unique(np.linspace(0, len(rollout.times) - 1, MOST_ELLIPSES).round().astype(int))
+    chosen = evenly_spaced(len(rollout.times), MOST_ELLIPSES)
     path = rollout.positions[:, dofs]
     hairline = (1e-3 * (float(np.ptp(path)) or 1.0)) ** 2  # a hull needs width, even where the position is known
     outlines = ellipses(path[chosen], covariances[chosen][:, dofs][..., dofs] + hairline * np.eye(2), TUBE_STDS)
@@ -64,7 +73,7 @@ def plot_path_tube(ax: "Axes", rollout: GaussianTrajectory, covariances: FloatAr
     hulls: list[Any] = [points[ConvexHull(points).vertices] for points in pairs]
     tube = PolyCollection(hulls, facecolor=BAND, edgecolor=BAND, linewidth=0.4, zorder=1, label="2 std, 86 % at each time")
     ax.add_collection(tube)
-    for k in np.unique(np.linspace(0, len(chosen) - 1, OUTLINED).round().astype(int)):
+    for k in evenly_spaced(len(chosen), OUTLINED):
         ax.plot(*outlines[k].T, color=MEAN, linewidth=0.5, linestyle=":", zorder=2)
     ax.plot(path[:, 0], path[:, 1], color=MEAN, linewidth=2, label="mean", zorder=3)
     ax.plot(*path[0], color=MEAN, marker="o", linestyle="none", label="start", zorder=4)
@@ -74,6 +83,11 @@ def plot_path_tube(ax: "Axes", rollout: GaussianTrajectory, covariances: FloatAr
     return ax
 
 
+def evenly_spaced(count: int, most: int) -> IntArray:
+    """Places of at most so many samples out of `count`, evenly spread, the first and the last among them."""
+    return np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(np.int64))
+
+
 def ellipses(centers: FloatArray, covariances: FloatArray, n_stds: float, n_points: int = 32) -> FloatArray:
     """Outlines (M, n_points, 2) at a Mahalanobis distance of n_stds around centers (M, 2), data units."""
     angles = np.linspace(0, 2 * np.pi, n_points)
@@ -81,6 +95,19 @@ def ellipses(centers: FloatArray, covariances: FloatArray, n_stds: float, n_poin
     factors = vectors * np.sqrt(np.maximum(eigenvalues, 0.0))[:, None, :]
     circle = n_stds * np.stack([np.cos(angles), np.sin(angles)])
     return np.asarray(centers[:, None, :] + np.swapaxes(factors @ circle, 1, 2))
+
+
+def tube_ellipses(centers: FloatArray, covariances: FloatArray, n_stds: float = TUBE_STDS) -> FloatArray:
+    """Ellipses at a Mahalanobis distance of n_stds, (M, 5) array: centre x and y, both half axes, angle of the first, radians.
+
+    Parameters
+    ----------
+    centers : (M, 2) array, data units.
+    covariances : (M, 2, 2) array, data units squared.
+    """
+    eigenvalues, vectors = np.linalg.eigh(covariances)
+    half_axes = n_stds * np.sqrt(np.maximum(eigenvalues, 0.0))
+    return np.column_stack([centers, half_axes, np.arctan2(vectors[:, 1, 0], vectors[:, 0, 0])])
 
 
 def band_panels(rollout: GaussianTrajectory, dofs: Sequence[int]) -> list[Panel]:
