@@ -15,13 +15,14 @@ demo: $(VENV)/.demo
 	$(BIN)/probdmp demo
 
 test: $(VENV)/.test browser
-	$(BIN)/python -m pytest -n auto --dist worksteal
+	$(BIN)/python -m pytest -n auto --dist worksteal --ignore=tests/studio/browser
+	$(BIN)/python -m pytest tests/studio/browser
 
-# Tests of the studio's page run in Chromium. It is installed where that can be done; elsewhere they are skipped.
+# Tests of the studio's page run in Chromium, one after the other, for they draw in real time. It is installed where that can be done; elsewhere they are skipped.
 browser:
 	@test -n "$$PROBDMP_CHROMIUM" || command -v chromium >/dev/null || command -v chromium-browser >/dev/null || \
 	command -v google-chrome >/dev/null || ls $${HOME}/.cache/ms-playwright/chromium* >/dev/null 2>&1 || \
-	{ test "$$(id -u)" = 0 && command -v apt-get >/dev/null && apt-get install --yes --no-install-recommends chromium >/dev/null; } || \
+	{ test "$$(id -u)" = 0 && command -v apt-get >/dev/null && apt-get update >/dev/null && apt-get install --yes --no-install-recommends chromium >/dev/null; } || \
 	echo "No Chromium: tests in a browser are skipped. sudo apt-get install chromium, or $(BIN)/playwright install chromium"
 
 # The same laws of filters and steps without the compiled kernels.
