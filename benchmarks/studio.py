@@ -20,6 +20,10 @@ from typing import Any
 import numpy as np
 from playwright.sync_api import Browser, Page, sync_playwright
 
+from probdmp.studio import jobs
+from probdmp.studio.settings import Settings
+from probdmp.studio.strokes import example_strokes
+
 STROKES = 10
 SAMPLES = 60
 """Of a stroke, 16 ms apart."""
@@ -97,6 +101,18 @@ def play(page: Page, speed: str) -> dict[str, Any]:
     }
 
 
+def learning_times() -> list[float]:
+    """Milliseconds of processor time that learning from one stroke, two, … ten takes."""
+    strokes = example_strokes("a")
+    jobs.warm_up()
+    times = []
+    for n in range(1, STROKES + 1):
+        before = time.process_time()
+        jobs.learn(tuple(strokes[:n]), Settings().parameters)
+        times.append(1000 * (time.process_time() - before))
+    return times
+
+
 def take_picture(page: Page, path: str) -> None:
     """Of a movement that is held, and of what is said about it."""
     page.locator("#modes").get_by_text("Play", exact=True).click()
@@ -123,6 +139,8 @@ def open_page(browser: Browser, address: str, scale: float = 1.0) -> Page:
 
 def measure(page: Page, given: argparse.Namespace) -> None:
     """Print how long bands take, and how many frames come."""
+    alone = learning_times()
+    print(f"learning alone, processor time: {min(alone):.0f} to {max(alone):.0f} ms; load average {os.getloadavg()[0]:.1f}")
     page.evaluate(COUNT_TICKS)
     waits = np.array(strokes_to_bands(page, given.pause))
     print(f"stroke to band, {STROKES} strokes: {' '.join(f'{w:.0f}' for w in waits)} ms")

@@ -11,7 +11,7 @@ from websockets.sync.client import connect
 from probdmp.studio.application import studio_app
 from probdmp.studio.server import make_server
 
-PATIENCE = 20
+PATIENCE = 60
 """Seconds."""
 
 

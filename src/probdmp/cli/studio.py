@@ -30,7 +30,9 @@ def studio(
     """Teach, execute and disturb movements in the browser.
 
     Draw a letter a few times and see what is learned; play it, hold the pen, and see what is noticed, when and why. In JSON:
-    the address of the page, once it is there. Everything runs on this machine; nothing is sent elsewhere. Ctrl-C ends it. Needs the extra: pip install 'probdmp[studio]'.
+    the address of the page, once it is there.
+
+    Everything runs on this machine; nothing is sent elsewhere. Ctrl-C ends it. Needs the extra: pip install 'probdmp[studio]'.
     """
     from probdmp.studio import StudioOptions, serve
 

@@ -129,10 +129,10 @@ class Learner:
             if not self._is_stale and library:
                 found |= await self._calibrated(library, strokes)
             kept = {label: d for label, d in session.detectors.items() if label in session.movements}
-            session.detectors, session.is_calibrated_late = kept | found, ""
+            session.detectors, session.calibration_problem = kept | found, ""
             self._news.set()
         except ProbDMPError as error:
-            session.is_calibrated_late = str(error)
+            session.calibration_problem = str(error)
         session.send(views.state_view(session), "state")
 
     async def _calibrated(self, library: dict[str, Any], strokes: dict[str, Any]) -> dict[str, FailureDetector]:

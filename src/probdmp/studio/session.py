@@ -67,7 +67,7 @@ class Session:
         self.placement: Placement | None = None
         """How recordings from files were put onto the canvas, if they would not have fitted."""
         self.detectors: dict[str, FailureDetector] = {}
-        self.is_calibrated_late = ""
+        self.calibration_problem = ""
         """Why there are no detectors, if calibrating failed."""
         self.outbox: Outbox | None = None
         """Of the page, while it is connected."""

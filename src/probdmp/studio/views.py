@@ -72,7 +72,7 @@ def calibration_view(session: Session) -> dict[str, Any] | None:
     detector, identity = session.detectors.get(session.selected or ""), movement.learned.primitive_.identity
     unknown = {"n": 0, "attainable": None, "alpha": session.settings.alpha, "guarantee": "none"}
     if detector is None or identity not in {p.identity for p in detector.primitives_.values()}:
-        why = session.is_calibrated_late
+        why = session.calibration_problem
         return unknown | {"text": f"Not calibrated. {why}" if why else "Being calibrated."}
     if not detector.calibrations_:
         text = "One demonstration does not say how they vary: the paper's rule watches. Draw it again to calibrate."

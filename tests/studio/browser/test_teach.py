@@ -6,7 +6,9 @@ from studio_browser import Studio, line
 def test_a_letter_drawn_three_times_has_a_band(studio: Studio) -> None:
     page = studio.page
     assert page.inner_text("#hint") == "Draw an a, three times."
-    studio.teach()
+    studio.teach(strokes=2)
+    studio.draw(shift=1)
+    page.wait_for_selector('.count:text-is("3 strokes, learned")')
     assert page.inner_text("#hint") == "It knows the movement. Press Play."
     assert (
         page.get_attribute("#paper", "aria-label") == "3 strokes of a; the mean path with its band of two standard deviations"
