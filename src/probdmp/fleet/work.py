@@ -19,7 +19,7 @@ from probdmp.fleet.plan import Part
 from probdmp.fleet.scorer import Scorer
 from probdmp.io import ExecutionTable, ParquetExecutions
 
-__all__ = ["Assignment", "Worker", "process_pool", "score_here", "score_in_processes"]
+__all__ = ["Assignment", "Worker", "one_thread_each", "process_pool", "score_here", "score_in_processes"]
 
 Item = TypeVar("Item")
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
@@ -124,16 +124,25 @@ def process_pool(jobs: int, assignment: Assignment | None = None) -> Iterator[Pr
         If one of them is killed.
     """
     context = multiprocessing.get_context("spawn")
+    with one_thread_each():
+        pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_begin, initargs=(assignment,))
+        try:
+            yield pool
+        except BrokenProcessPool as error:
+            hint = "Was there enough memory? Call it again, perhaps with fewer --jobs."
+            raise ProbDMPError("all processes to live until the end", "one that was killed", hint) from error
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def one_thread_each() -> Iterator[None]:
+    """The linear algebra of processes that are started meanwhile has one thread."""
     before = {name: os.environ.get(name) for name in ONE_THREAD}
     os.environ.update(dict.fromkeys(ONE_THREAD, "1"))  # read by what a process imports, so they cannot be told later
-    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_begin, initargs=(assignment,))
     try:
-        yield pool
-    except BrokenProcessPool as error:
-        hint = "Was there enough memory? Call it again, perhaps with fewer --jobs."
-        raise ProbDMPError("all processes to live until the end", "one that was killed", hint) from error
+        yield
     finally:
-        pool.shutdown(cancel_futures=True)
         os.environ.update({name: value for name, value in before.items() if value is not None})
         for name in (name for name, value in before.items() if value is None):
             del os.environ[name]

@@ -139,9 +139,10 @@ class Room:
 
     async def _play(self, playing: Playing) -> None:
         """Frames until the pen has arrived."""
-        shown = time.perf_counter()
+        shown = due = time.perf_counter()
         while not playing.is_over:
-            await asyncio.sleep(max(0.0, shown + 1 / FRAME_RATE - time.perf_counter()))
+            due = max(due + 1 / FRAME_RATE, shown)  # of the last frame, so that what is slept too long does not add up
+            await asyncio.sleep(max(0.0, due - time.perf_counter()))
             now = time.perf_counter()
             tick, shown = await asyncio.to_thread(playing.advance, now - shown), now
             self._show_tick(PLAYING, tick)

@@ -10,6 +10,7 @@ from multiprocessing import active_children, get_context
 from typing import Any, TypeVar
 
 from probdmp.errors import InputError
+from probdmp.fleet.work import one_thread_each
 from probdmp.studio.limits import JOB_SECONDS
 
 __all__ = ["Workers"]
@@ -33,7 +34,8 @@ class _Worker:
         context = get_context("spawn")
         self._executor = ProcessPoolExecutor(1, mp_context=context, initializer=_prepare, initargs=(warms_up,))
         others = set(active_children())
-        self._ready = self._executor.submit(os.getpid)
+        with one_thread_each():
+            self._ready = self._executor.submit(os.getpid)
         self._processes = set(active_children()) - others
 
     async def run(self, work: Callable[..., Result], arguments: tuple[Any, ...], seconds: float) -> Result:
