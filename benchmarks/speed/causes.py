@@ -9,7 +9,7 @@ CAUSES = {
         "them side by side then costs more than filtering them"
     ),
     "NumPy twin against dynamax": ("each step is ten passes over arrays of 2,048 recordings, every one of them a call"),
-    "one series": ("the kernel takes half of the call; the rest is Python: shapes, and the array of the result"),
+    "one series": ("not profiled in this run; probably, much of the call is Python: shapes, and the array of the result"),
     "smoother against dynamax": ("three states of each sample are written, to memory that is new at every call"),
     "batch from memory": ("recordings are brought side by side before they are filtered"),
     "two threads": ("not profiled; both cores read from one memory"),
@@ -34,9 +34,8 @@ CAUSES = {
         "modules are compiled at every start where bytecode is not kept (PYTHONDONTWRITEBYTECODE), as it was not here"
     ),
     "fleet": (
-        "a verdict is 450,000 multiplications of a window with what is expected of it, which take a third of the time; the "
-        "rest is spread over reading, ticks, likelihoods and reasons, none of which takes more than a sixth; and two threads "
-        "wait for each other in Python"
+        "not profiled in this run; probably the windows of the trajectory, multiplied with what is expected of them, take the "
+        "most, the rest is spread over reading, ticks, likelihoods and reasons, and two threads wait for each other in Python"
     ),
 }
 """In words, by how the name of a row begins."""
