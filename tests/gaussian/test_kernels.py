@@ -293,6 +293,55 @@ def test_windows_that_are_not_there_are_refused(fault):
         _compiled().least_squares(values, rows, maps, which, ends, reach, wanted, np.zeros(1), found)
 
 
+@given(st.integers(0, 20), st.integers(1, 9), st.integers(1, 4), seeds)
+def test_recordings_are_plain_if_nothing_repeats_or_leaps(n, n_times, n_signals, seed):
+    rng = np.random.default_rng(seed)
+    values = rng.normal(size=(n, n_times, n_signals)) + 3 * np.arange(n_times)[:, None]
+    limits = rng.uniform(1.0, 8.0, n_signals)
+    for recording in values[rng.random(n) < 0.5]:
+        recording[rng.integers(n_times), rng.integers(n_signals)] = rng.choice([np.nan, np.inf, recording[0, 0], 0.0])
+    expected = []
+    for recording in values:
+        with np.errstate(invalid="ignore"):
+            steps = np.diff(recording, axis=0)
+            jumps = np.abs(np.diff(steps, axis=0))
+        expected.append(
+            all(step != 0 for step in steps.ravel())
+            and all(jump <= limits[i % n_signals] for i, jump in enumerate(jumps.ravel()))
+        )
+    for module in {_kernels_numpy, _compiled() if kernels.COMPILED else _kernels_numpy}:
+        found = np.full(n, 7)
+        module.plain_recordings(values, limits, found)
+        assert found.tolist() == expected
+
+
+@given(st.integers(0, 20), st.integers(1, 9), st.integers(1, 4), st.integers(0, 30), seeds)
+def test_points_are_on_the_lines_between_samples(n, n_times, n_signals, n_points, seed):
+    rng = np.random.default_rng(seed)
+    values, starts, ranges = (
+        rng.normal(size=(n, n_times, n_signals)),
+        rng.normal(size=(n, n_signals)),
+        rng.uniform(0.1, 9, n_signals),
+    )
+    after, beyond = rng.integers(0, n_times, n_points), rng.random(n_points)
+    places = after - np.where(after > 0, beyond, 0)
+    for module in {_kernels_numpy, _compiled() if kernels.COMPILED else _kernels_numpy}:
+        points = np.empty((n_points, n_signals, n))
+        module.points_on_lines(values, after, beyond, starts, ranges, points)
+        for i, recording in enumerate(values):
+            for d, column in enumerate(recording.T):
+                expected = (np.interp(places, np.arange(n_times), column) - starts[i, d]) / ranges[d]
+                np.testing.assert_allclose(points[:, d, i], expected, rtol=0, atol=1e-12)
+
+
+@needs_extension
+@pytest.mark.parametrize("sample", [-1, 3])
+def test_samples_that_are_not_there_are_refused(sample):
+    arguments = np.ones((2, 3, 1)), np.array([0, sample, 1]), np.zeros(3), np.zeros((2, 1)), np.ones(1), np.empty((3, 1, 2))
+    with pytest.raises(ValueError, match="after: expected samples below 3"):
+        _compiled().points_on_lines(*arguments)
+
+
 @needs_extension
 @pytest.mark.parametrize("fault", ["dtype", "axes", "shape", "order", "count", "object", "read-only"])
 def test_arrays_that_do_not_fit_are_refused(fault):

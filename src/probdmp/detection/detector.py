@@ -108,7 +108,7 @@ class FailureDetector(HasParameters):
         # Together, and only now: a fit that fails leaves the detector as it was.
         self.rule_, self.primitives_ = rule, {label: member.primitive for label, member in library.members.items()}
         self.sensors_ = None if sensors is None else tuple(sensors)
-        self._outputs = {identity: array.outputs for identity, array in library.arrays.items()}
+        self._arrays = library.arrays
         return self
 
     @property
@@ -140,7 +140,7 @@ class FailureDetector(HasParameters):
         """
         rule = self._fitted()
         self._check_known(primitive)
-        fitted = self._outputs[primitive.identity]
+        fitted = self._arrays[primitive.identity].outputs
         if outputs is not None and outputs != fitted:
             hint = "Give fit(…, sensors=…) those that observe executions; what is normal depends on them."
             raise InputError(f"an execution observed by {', '.join(fitted)}, as in calibration", ", ".join(outputs), hint)
@@ -173,8 +173,9 @@ class FailureDetector(HasParameters):
 
     def judge(self, primitive: Primitive, batch: ExecutionBatch) -> BatchJudgement:
         """Verdicts on many executions of one primitive at once, as arrays; those of `verdicts` are the same."""
-        rule, array = self._fitted(), SensorArray(primitive, self.sensors_)
+        rule = self._fitted()
         self._check_known(primitive)
+        array = self._arrays[primitive.identity]
         judgement = rule.judge(primitive, batch.tasks, lambda: RecordedSignals.of_batch(array, batch))
         if judgement is not None:
             return BatchJudgement.of_judgement(judgement, rule.watched(primitive))
@@ -226,7 +227,7 @@ class FailureDetector(HasParameters):
         primitives = detector.primitives_ = dict(primitives)  # one that can be copied and sent elsewhere
         sensors = None if plain is None else sensors_from_plain(plain, next(iter(primitives.values())))
         arrays = {primitive.identity: SensorArray(primitive, sensors) for primitive in primitives.values()}
-        detector.sensors_, detector._outputs = sensors, {identity: array.outputs for identity, array in arrays.items()}
+        detector.sensors_, detector._arrays = sensors, arrays
         if rule == "paper":
             detector.rule_ = PaperRule.from_state(parts, primitives, arrays)
             detector.likelihood = detector.rule_.likelihood
@@ -243,7 +244,7 @@ class FailureDetector(HasParameters):
 
     def _verdicts(self, primitive: Primitive, tasks: Sequence[Task], recordings: Sequence[Demonstration]) -> list[Verdict]:
         """On recordings of one primitive."""
-        rule, array = self._fitted(), SensorArray(primitive, self.sensors_)
+        rule, array = self._fitted(), self._arrays[primitive.identity]
         judgement = rule.judge(primitive, stack_tasks(tasks), lambda: RecordedSignals.of(array, recordings))
         if judgement is None:
             return self._replayed(primitive, tasks, recordings)

@@ -12,6 +12,7 @@ from probdmp.checks import MILLISECONDS_HINT, BoolArray, FloatArray, IntArray
 from probdmp.detection.phase_clock import ROUNDING, TICKS, longest_gaps
 from probdmp.detection.recorded_sensors import NEVER, Sensing, SensorRecord, watch_recordings
 from probdmp.errors import InputError
+from probdmp.gaussian import kernels
 
 __all__ = ["RecordedTicks", "record_ticks"]
 
@@ -111,15 +112,31 @@ def record_ticks(
     first = np.take_along_axis(sensors.believed, np.minimum(begun, n_samples - 1)[:, None], axis=1)[:, 0]
     starts, d = np.where(np.arange(n_signals) < sensing.n_dof, first, 0.0), sensing.n_dof
     clocks = Clocks.of(sensing.profile.usual_gaps, durations, dts)
-    paths, steps = _ticks_of(clocks, sensors.believed, lengths, sensors.is_whole)
-    paths -= starts[:, None]
-    paths /= sensing.ranges
+    if len(clocks.rates) == 1 and sensors.is_whole.all():
+        paths, steps = _drawn_together(clocks, sensors.believed, starts, sensing.ranges)
+    else:
+        paths, steps = _ticks_of(clocks, sensors.believed, lengths, sensors.is_whole)
+        paths -= starts[:, None]
+        paths /= sensing.ranges
     if np.any(steps[:, -1] == NEVER):
         paths[steps == NEVER] = 0.0
     # What is told of the goal counts from the start as it was known with the first tick.
     known = (begun[:, :d] <= steps[:, :1]) & (steps[:, :1] < NEVER)
     ahead = np.where(known, (goals - starts[:, :d]) / sensing.ranges[:d], np.nan)
     return RecordedTicks(paths, (steps < NEVER).sum(axis=1), steps, ahead, sensors)
+
+
+def _drawn_together(clocks: Clocks, values: FloatArray, starts: FloatArray, ranges: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Paths (N, K, S) of which every sample was seen, by one clock, and the samples (N, K) with which ticks come out."""
+    n, n_samples, n_signals = values.shape
+    ticks = np.arange(int(np.floor(clocks.at(np.full((1, 1, 1), n_samples - 1)) + ROUNDING).item()) + 1)[:, None]
+    reached = clocks.first_reaching(ticks)
+    after = np.minimum(reached, n_samples - 1)
+    beyond, _ = _part_beyond(clocks, ticks, np.maximum(after - 1, 0), after)
+    points = np.empty((len(ticks), n_signals, n))
+    kernels.points_on_lines(np.ascontiguousarray(values), after.ravel(), beyond.ravel(), starts, ranges, points)
+    steps = np.where(reached < n_samples, reached, NEVER)
+    return points.transpose(2, 0, 1), np.repeat(steps[..., 0], n, axis=0)
 
 
 def _ticks_of(clocks: Clocks, values: FloatArray, lengths: IntArray, is_whole: BoolArray) -> tuple[FloatArray, IntArray]:
@@ -165,14 +182,20 @@ def _lines(
     clocks: Clocks, values: FloatArray, ticks: IntArray, before: IntArray, after: IntArray
 ) -> tuple[FloatArray, BoolArray]:
     """Values at ticks (K, 1) on the lines through samples before and after them, (N, K, S), and whether these are near."""
-    now, last = clocks.at(after), clocks.at(before)
-    beyond = np.where(clocks.is_at(after, ticks), 0.0, now - ticks) / np.maximum(now - last, ROUNDING)
+    beyond, is_near = _part_beyond(clocks, ticks, before, after)
     ends, lines = _at(values, after), _at(values, before)
     lines -= ends
     lines *= beyond
     np.copyto(lines, 0.0, where=beyond == 0)  # there may be nothing before
     lines += ends
-    return lines, now - last <= clocks.gaps
+    return lines, is_near
+
+
+def _part_beyond(clocks: Clocks, ticks: IntArray, before: IntArray, after: IntArray) -> tuple[FloatArray, BoolArray]:
+    """How far before the sample after it a tick is, as a part of the way between the two, and whether these are near."""
+    now, last = clocks.at(after), clocks.at(before)
+    beyond = np.where(clocks.is_at(after, ticks), 0.0, now - ticks) / np.maximum(now - last, ROUNDING)
+    return beyond, now - last <= clocks.gaps
 
 
 def _at(values: FloatArray, samples: IntArray) -> FloatArray:

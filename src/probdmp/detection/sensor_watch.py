@@ -9,6 +9,7 @@ import numpy as np
 
 from probdmp.checks import BoolArray, FloatArray, IntArray
 from probdmp.detection.profile import ExecutionProfile
+from probdmp.gaussian import kernels
 
 __all__ = ["SensorWatch"]
 
@@ -117,11 +118,9 @@ class SensorWatch:
 
     def is_plain(self, recorded: FloatArray) -> BoolArray:
         """(N,) array: whether of a whole recording, (N, T, S), all is measured and believed, and nothing repeats."""
-        steps = recorded[:, 1:] - recorded[:, :-1]
-        moves = steps.all(axis=(1, 2))  # a difference of exactly zero is a repetition
-        jumps = steps[:, 1:] - steps[:, :-1]
-        np.abs(jumps, out=jumps)
-        return np.asarray(moves & (jumps <= self._largest_jumps).all(axis=(1, 2)))  # not so of NaN: of what was not measured
+        is_plain = np.empty(len(recorded), dtype=np.int64)
+        kernels.plain_recordings(np.ascontiguousarray(recorded), self._largest_jumps, is_plain)
+        return np.asarray(is_plain == 1)
 
     def believe(self, measured: FloatArray) -> FloatArray:
         """The sample (*batch, S) without what is suspicious of it, which is NaN instead; units of each signal."""

@@ -154,6 +154,13 @@ typedef struct {
     double *packed, *window, *sums;
 } Windows;
 
+/* Recordings (N, T, S), and points between their samples: (before - after) beyond + after, less the start, in ranges. */
+typedef struct {
+    Py_ssize_t n, n_times, n_signals, n_points;
+    const double *values, *limits, *starts, *ranges, *beyond;
+    const int64_t *after;
+} Recordings;
+
 /* ---- Loops, for any processor and for AVX2 ------------------------------------------------------------------------------ */
 
 /* Each of them has two names. */
@@ -188,6 +195,9 @@ typedef struct {
 #define look_at_lane NAMED(look_at_lane)
 #define look_at_windows NAMED(look_at_windows)
 
+#define look_for_odd NAMED(look_for_odd)
+#define draw_lines NAMED(draw_lines)
+
 #define NAMED(name) name##_anywhere
 #include "_kernels.c"
 #undef NAMED
@@ -208,6 +218,8 @@ static void look_at_processor(void) {}
 #endif
 #undef filter_all
 #undef look_at_windows
+#undef look_for_odd
+#undef draw_lines
 #undef step_all
 #undef score_all
 #undef smooth_all
@@ -450,13 +462,62 @@ static PyObject *window_mixtures(PyObject *module, PyObject *const *arguments, P
     Py_RETURN_NONE;
 }
 
+/* ---- Recordings --------------------------------------------------------------------------------------------------------- */
+
+static PyObject *plain_recordings(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
+{
+    static const Spec specs[] = {{"values", 0, 3, 0}, {"limits", 0, 1, 0}, {"is_plain", 1, 1, 1}};
+    enum { COUNT = sizeof(specs) / sizeof(specs[0]) };
+    Array x[COUNT];
+    if (take(arguments, given, specs, COUNT, x) < 0) return NULL;
+    const Recordings s = {.n = x[0].view.shape[0], .n_times = x[0].view.shape[1], .n_signals = x[0].view.shape[2],
+                          .values = x[0].data, .limits = x[1].data};
+    const int fits = agree(&x[1], "limits", s.n_signals, 0, 0, 0) && agree(&x[2], "is_plain", s.n, 0, 0, 0);
+    if (fits) {
+        Py_BEGIN_ALLOW_THREADS
+        CHOOSE(look_for_odd)(&s, x[2].view.buf);
+        Py_END_ALLOW_THREADS
+    }
+    release(x, COUNT);
+    if (!fits) return NULL;
+    Py_RETURN_NONE;
+}
+
+static PyObject *points_on_lines(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
+{
+    static const Spec specs[] = {{"values", 0, 3, 0}, {"after", 0, 1, 1}, {"beyond", 0, 1, 0}, {"starts", 0, 2, 0},
+                                 {"ranges", 0, 1, 0}, {"points", 1, 3, 0}};
+    enum { COUNT = sizeof(specs) / sizeof(specs[0]) };
+    Array x[COUNT];
+    if (take(arguments, given, specs, COUNT, x) < 0) return NULL;
+    const Recordings s = {
+        .n = x[0].view.shape[0], .n_times = x[0].view.shape[1], .n_signals = x[0].view.shape[2], .n_points = x[1].view.shape[0],
+        .values = x[0].data, .after = x[1].integers, .beyond = x[2].data, .starts = x[3].data, .ranges = x[4].data,
+    };
+    int fits = agree(&x[2], "beyond", s.n_points, 0, 0, 0) && agree(&x[3], "starts", s.n, s.n_signals, 0, 0)
+               && agree(&x[4], "ranges", s.n_signals, 0, 0, 0) && agree(&x[5], "points", s.n_points, s.n_signals, s.n, 0);
+    for (Py_ssize_t k = 0; fits && k < s.n_points; k++)
+        if (s.after[k] < 0 || s.after[k] >= s.n_times) {
+            PyErr_Format(PyExc_ValueError, "after: expected samples below %zd", s.n_times);
+            fits = 0;
+        }
+    if (fits) {
+        Py_BEGIN_ALLOW_THREADS
+        CHOOSE(draw_lines)(&s, x[5].data);
+        Py_END_ALLOW_THREADS
+    }
+    release(x, COUNT);
+    if (!fits) return NULL;
+    Py_RETURN_NONE;
+}
+
 /* ---- The module --------------------------------------------------------------------------------------------------------- */
 
 #define FUNCTION(name) {#name, (PyCFunction)(void (*)(void))name, METH_FASTCALL, NULL}
 
 static PyMethodDef functions[] = {
     FUNCTION(filter_systems), FUNCTION(filter_step), FUNCTION(squared_innovations), FUNCTION(smoothed_states),
-    FUNCTION(least_squares), FUNCTION(window_mixtures),
+    FUNCTION(least_squares), FUNCTION(window_mixtures), FUNCTION(plain_recordings), FUNCTION(points_on_lines),
     {NULL, NULL, 0, NULL},
 };
 
@@ -1013,6 +1074,41 @@ static void look_at_windows(const Windows *s, double *found)
         pack(s, s->which + mapped * s->n_accounts);
         for (Py_ssize_t first = 0; first < s->n; first += WIDTH)
             look_at_lane(s, place, mapped, first, s->n - first < WIDTH ? s->n - first : WIDTH, found);
+    }
+}
+
+/* ---- Recordings --------------------------------------------------------------------------------------------------------- */
+
+/* Which recordings have no sample that repeats the one before, or is further from the line through the two before than may be. */
+static void look_for_odd(const Recordings *s, int64_t *is_plain)
+{
+    const Py_ssize_t d = s->n_signals, size = s->n_times * d;
+    for (Py_ssize_t i = 0; i < s->n; i++) {
+        const double *v = s->values + i * size;
+        int odd = 0;
+        for (Py_ssize_t j = d; j < size; j++) odd |= v[j] == v[j - d];
+        for (Py_ssize_t k = 0; k < d; k++)
+            for (Py_ssize_t j = k + 2 * d; j < size; j += d)
+                odd |= !(fabs((v[j] - v[j - d]) - (v[j - d] - v[j - 2 * d])) <= s->limits[k]);
+        is_plain[i] = !odd;
+    }
+}
+
+/* WIDTH recordings at a time, as their points are neighbours. */
+static void draw_lines(const Recordings *s, double *points)
+{
+    const Py_ssize_t d = s->n_signals, size = s->n_times * d;
+    for (Py_ssize_t first = 0; first < s->n; first += WIDTH) {
+        const Py_ssize_t width = s->n - first < WIDTH ? s->n - first : WIDTH;
+        for (Py_ssize_t k = 0; k < s->n_points; k++) {
+            const Py_ssize_t after = s->after[k] * d, before = s->after[k] > 0 ? after - d : after;
+            for (Py_ssize_t j = 0; j < d; j++) {
+                double *to = points + (k * d + j) * s->n + first;
+                const double *v = s->values + first * size + j, *start = s->starts + first * d + j;
+                for (Py_ssize_t w = 0; w < width; w++, v += size)
+                    to[w] = ((v[before] - v[after]) * s->beyond[k] + v[after] - start[w * d]) / s->ranges[j];
+            }
+        }
     }
 }
 

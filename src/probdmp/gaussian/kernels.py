@@ -19,6 +19,8 @@ __all__ = [
     "filter_systems",
     "in_threads",
     "least_squares",
+    "plain_recordings",
+    "points_on_lines",
     "smoothed_states",
     "split_sums",
     "squared_innovations",
@@ -54,6 +56,8 @@ squared_innovations: Callable[..., None] = _kernels.squared_innovations
 smoothed_states: Callable[..., None] = _kernels.smoothed_states
 least_squares: Callable[..., None] = _kernels.least_squares
 window_mixtures: Callable[..., None] = _kernels.window_mixtures
+plain_recordings: Callable[..., None] = _kernels.plain_recordings
+points_on_lines: Callable[..., None] = _kernels.points_on_lines
 split_sums = _kernels_numpy.split_sums
 
 

@@ -1,0 +1,186 @@
+"""The kernels for recordings and their windows in NumPy, the second half of `_kernels_numpy`.
+
+All arrays are C-contiguous; the last ones are written to.
+"""
+
+import numpy as np
+
+from probdmp.checks import FloatArray, IntArray
+
+__all__ = ["least_squares", "plain_recordings", "points_on_lines", "split_sums", "window_mixtures"]
+
+FEW = 16
+"""Executions up to which all places are multiplied at once: then the calls cost more than the numbers."""
+
+
+def plain_recordings(values: FloatArray, limits: FloatArray, is_plain: IntArray) -> None:
+    """Whether recordings have no sample that repeats the one before, or is far from the line through the two before.
+
+    Parameters
+    ----------
+    values : (N, T, S) array.
+    limits : (S,) array: how far it may be.
+    is_plain : written, (N,): 1 or 0; 0 too where a later sample than the second is NaN.
+    """
+    steps = values[:, 1:] - values[:, :-1]
+    moves = steps.all(axis=(1, 2))
+    jumps = steps[:, 1:] - steps[:, :-1]
+    np.abs(jumps, out=jumps)
+    is_plain[:] = moves & (jumps <= limits).all(axis=(1, 2))
+
+
+def points_on_lines(
+    values: FloatArray, after: IntArray, beyond: FloatArray, starts: FloatArray, ranges: FloatArray, points: FloatArray
+) -> None:
+    """Points between two samples of recordings, relative to their starts.
+
+    Parameters
+    ----------
+    values : (N, T, S) array, finite.
+    after, beyond : (K,) arrays: the second of the two samples, and how far before it a point is, as a part of the way.
+    starts, ranges : (N, S) and (S,) arrays.
+    points : written, (K, S, N).
+    """
+    ends, lines = np.take(values, after, axis=1), np.take(values, np.maximum(after - 1, 0), axis=1)
+    lines -= ends
+    lines *= beyond[:, None]
+    lines += ends
+    lines -= starts[:, None]
+    lines /= ranges
+    points[:] = np.moveaxis(lines, 0, -1)
+
+
+def least_squares(
+    values: FloatArray,
+    rows: IntArray,
+    maps: FloatArray,
+    which: IntArray,
+    ends: IntArray,
+    reach: IntArray,
+    wanted: IntArray,
+    penalties: FloatArray,
+    found: FloatArray,
+) -> None:
+    """Squared length of windows after linear maps, up to several of their outputs: the least over accounts of a place.
+
+    Parameters
+    ----------
+    values : (M, n) array: all numbers that may be in a window, of each execution.
+    rows : (G, K) which of them make up the window at each of G places.
+    maps : (U, R, K) array: R outputs of a window.
+    which : (P, A) the maps of each place, for A accounts of it; a place beyond the last has those of the last.
+    ends : (J) increasing; sums run over outputs 0, 1, ..., end - 1.
+    reach : (R) how many inputs, the first ones of a window, an output depends on; not decreasing.
+    wanted : (J) at how many places, the first ones, each of the sums is asked for; not increasing.
+    penalties : (A) what is added to the squares of each account.
+    found : written: J arrays (wanted, n), one after the other.
+    """
+    sums = _squares(values, rows, maps, which, ends, reach, wanted)
+    for squares, least in zip(sums, split_sums(found, wanted, values.shape[1]), strict=True):
+        np.add(squares, penalties[:, None], out=squares)
+        np.minimum.reduce(squares, axis=1, out=least)
+
+
+def _squares(
+    values: FloatArray,
+    rows: IntArray,
+    maps: FloatArray,
+    which: IntArray,
+    ends: IntArray,
+    reach: IntArray,
+    wanted: IntArray,
+) -> list[FloatArray]:
+    """J arrays (wanted, A, n)."""
+    n, n_accounts = values.shape[1], which.shape[1]
+    sums = [np.empty((count, n_accounts, n)) for count in wanted.tolist()]
+    if n <= FEW:
+        _look_at_all_places(values, rows, maps, which, ends, sums)
+        return sums
+    window = np.empty((maps.shape[2], n))
+    outputs = np.empty((int(np.diff(ends, prepend=0).max()) * n_accounts, n))
+    for place in range(int(wanted[0])):
+        np.take(values, rows[place], axis=0, out=window, mode="clip")
+        at_place, begin = maps[which[min(place, len(which) - 1)]], 0
+        for j, (end, used) in enumerate(zip(ends, reach[ends - 1], strict=True)):
+            if place >= wanted[j]:
+                break
+            white = outputs[: (end - begin) * n_accounts]
+            np.matmul(at_place[:, begin:end, :used].reshape(len(white), used), window[:used], out=white)
+            np.multiply(white, white, out=white)
+            np.add.reduce(white.reshape(n_accounts, end - begin, n), axis=1, out=sums[j][place])
+            if j:
+                sums[j][place] += sums[j - 1][place]
+            begin = end
+    return sums
+
+
+def window_mixtures(
+    values: FloatArray,
+    rows: IntArray,
+    maps: FloatArray,
+    which: IntArray,
+    ends: IntArray,
+    reach: IntArray,
+    wanted: IntArray,
+    scales: FloatArray,
+    n_halves: IntArray,
+    found: FloatArray,
+    freedom: float,
+) -> None:
+    """ln sum_a (scale_a (1 + square_a / freedom))^-(n_halves / 2) of such sums of squares, over the accounts.
+
+    Parameters
+    ----------
+    scales : (P, J, A) array, of each place and sum.
+    n_halves : (J)
+    found : written: J arrays (wanted, n), one after the other.
+    """
+    sums, mixtures = _squares(values, rows, maps, which, ends, reach, wanted), split_sums(found, wanted, values.shape[1])
+    for j, (some, mixed) in enumerate(zip(sums, mixtures, strict=True)):
+        own = scales[np.minimum(np.arange(len(some)), len(scales) - 1), j]
+        _mix(some, own, mixed, int(n_halves[j]), freedom)
+
+
+def split_sums(found: FloatArray, wanted: IntArray, n: int) -> list[FloatArray]:
+    """The J arrays (wanted, n) that are written one after the other."""
+    ends = np.cumsum(wanted * n).tolist()
+    return [found[end - count * n : end].reshape(count, n) for end, count in zip(ends, wanted.tolist(), strict=True)]
+
+
+def _mix(squares: FloatArray, scales: FloatArray, mixed: FloatArray, n_halves: int, freedom: float) -> None:
+    """Mixtures (G, n) of squares (G, A, n) with scales (G, A)."""
+    # A few places at a time, which stay close to the processor.
+    step = max(1, 16384 // max(squares[0].size, 1)) if len(squares) else 1
+    for begin in range(0, len(squares), step):
+        part = slice(begin, begin + step)
+        bases = squares[part] * (scales[part, :, None] / freedom)
+        bases += scales[part, :, None]
+        least = bases.min(axis=1)
+        np.divide(least[:, None], bases, out=bases)
+        np.log(_power(bases, n_halves).sum(axis=1), out=mixed[part])
+        mixed[part] -= n_halves / 2 * np.log(least)
+
+
+def _power(base: FloatArray, n_halves: int) -> FloatArray:
+    """base^(n_halves / 2) of numbers from 0 to 1, by squaring: far faster than for any exponent."""
+    power, exponent = np.sqrt(base) if n_halves % 2 else None, n_halves // 2
+    while exponent:
+        if exponent % 2:
+            power = base.copy() if power is None else np.multiply(power, base, out=power)
+        exponent //= 2
+        if exponent:
+            np.multiply(base, base, out=base)
+    return np.ones_like(base) if power is None else power
+
+
+def _look_at_all_places(
+    values: FloatArray, rows: IntArray, maps: FloatArray, which: IntArray, ends: IntArray, found: list[FloatArray]
+) -> None:
+    count, n_accounts, end = len(found[0]), which.shape[1], int(ends[-1])
+    at = maps[which[np.minimum(np.arange(count), len(which) - 1)], :end]
+    white = np.matmul(at.reshape(count, n_accounts * end, maps.shape[2]), values[rows[:count]])
+    np.multiply(white, white, out=white)
+    sums = np.add.reduceat(white.reshape(count, n_accounts, end, values.shape[1]), [0, *ends[:-1]], axis=2)
+    np.cumsum(sums, axis=2, out=sums)
+    for j, own in enumerate(found):
+        own[:] = sums[: len(own), :, j]
