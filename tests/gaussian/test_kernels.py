@@ -250,6 +250,39 @@ def test_mixtures_are_sums_of_densities(arguments, seed, most_halves, scale):
         assert_same(mixed, np.concatenate(expected))
 
 
+@given(windows(), seeds, st.integers(1, 40), st.sampled_from([0.0, -30.0, 30.0, 3.0]))
+def test_evidence_is_a_difference_of_densities_where_it_is_above_its_floor(arguments, seed, most_halves, constant):
+    values, _, _, which, ends, _, wanted = arguments
+    rng = np.random.default_rng(seed)
+    scales = np.exp(0.1 * rng.normal(size=(len(which), len(ends), which.shape[1])))
+    n_halves, constants = rng.integers(1, most_halves + 1, len(ends)), constant + rng.normal(size=len(ends) - 1)
+    floors = rng.choice([-np.inf, 0.0, 1.0, constant], len(constants))
+    if len(ends) == 1:
+        return
+    mixtures = np.empty(int(wanted.sum()) * values.shape[1])
+    _kernels_numpy.window_mixtures(*arguments, scales, n_halves, mixtures, 4.0)
+    here, *together = kernels.split_sums(mixtures, wanted, values.shape[1])
+    squares = rng.exponential(60.0, int(wanted[1:].sum()) * values.shape[1])
+    of_each = zip(kernels.split_sums(squares, wanted[1:], values.shape[1]), together, constants, floors, strict=True)
+    expected = [(c - some / 2 - mixed + here[: len(some)], floor) for some, mixed, c, floor in of_each]
+    expected = np.concatenate([np.where(evidence > floor, evidence, -np.inf).ravel() for evidence, floor in expected])
+    for module in {_kernels_numpy, _compiled() if kernels.COMPILED else _kernels_numpy}:
+        found = squares.copy()
+        module.window_evidence(*arguments, scales, n_halves, constants, floors, found, 4.0, int(rng.integers(which.shape[1])))
+        np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-11)
+
+
+@needs_extension
+@pytest.mark.parametrize("central", [-1, 1])
+def test_an_account_that_is_not_there_is_refused(central):
+    one = np.ones(2, dtype=np.int64)
+    rows, which = np.zeros((1, 1), dtype=np.int64), np.zeros((1, 1), dtype=np.int64)
+    arguments = np.ones((1, 3)), rows, np.ones((1, 2, 1)), which, np.array([1, 2]), one, one, np.ones((1, 2, 1)), one
+    _compiled().window_evidence(*arguments, np.zeros(1), np.zeros(1), np.zeros(3), 4.0, 0)
+    with pytest.raises(ValueError, match="one of 1 accounts"):
+        _compiled().window_evidence(*arguments, np.zeros(1), np.zeros(1), np.zeros(3), 4.0, central)
+
+
 @needs_extension
 @pytest.mark.parametrize("square", [0.0, 1e-300, 1e-30, 1.0, 2.0, 1e30, 1e280])
 def test_logarithms_of_mixtures_are_those_of_the_library(square):

@@ -18,7 +18,7 @@ from probdmp.checks import FloatArray, IntArray
 from probdmp.detection.path_model import PathModel
 from probdmp.detection.phase_clock import TICKS
 from probdmp.detection.trajectory_statistics import SHIFT_STD
-from probdmp.detection.window_maps import Densities, WindowInputs, WindowMaps, linear_maps
+from probdmp.detection.window_maps import Densities, Other, WindowInputs, WindowMaps, linear_maps
 from probdmp.detection.windows import PathWindows, inverse_of_cholesky
 
 __all__ = ["DEGREES_OF_FREEDOM", "EVIDENCE", "Evidence", "Foreseen", "Pace", "Standstill"]
@@ -70,10 +70,28 @@ class Foreseen:
         -------
         J arrays (wanted, n).
         """
-        ends, dof = points * self._dof, self._dof
+        numbers, ends = np.repeat(offsets, self._dof), points * self._dof
+        return self._windows.maps.mixtures(inputs, numbers, ends, wanted, self._densities(points))
+
+    def evidence(
+        self, inputs: WindowInputs, offsets: IntArray, points: IntArray, wanted: IntArray, other: Other, floors: FloatArray
+    ) -> list[FloatArray]:
+        """Nats that speak for another account of what follows the first of the points; arguments as above.
+
+        Parameters
+        ----------
+        floors : (J - 1) up to which they need not be known; -infinity then.
+
+        Returns
+        -------
+        J - 1 arrays (wanted, n).
+        """
+        numbers, ends = np.repeat(offsets, self._dof), points * self._dof
+        return self._windows.maps.evidence(inputs, numbers, ends, wanted, self._densities(points), other, floors)
+
+    def _densities(self, points: IntArray) -> Densities:
         bases = np.ascontiguousarray(self._bases[..., points - 1].swapaxes(1, 2))
-        densities = Densities(bases, int(DEGREES_OF_FREEDOM) + ends, DEGREES_OF_FREEDOM)
-        return self._windows.maps.mixtures(inputs, np.repeat(offsets, dof), ends, wanted, densities)
+        return Densities(bases, int(DEGREES_OF_FREEDOM) + points * self._dof, DEGREES_OF_FREEDOM)
 
     def looks(self, points: IntArray, places: IntArray) -> "Looks":
         """Ready to be asked about the first points and all points of single executions.
@@ -141,22 +159,18 @@ class Standstill:
         self._points_at = np.array([np.searchsorted(self.ahead, h, "right") for h in self.horizons])
         self._constants = np.array([self._rest_constants(int(points)) for points in self._points_at])
 
-    def weigh(self, inputs: WindowInputs, wanted: IntArray) -> list[FloatArray]:
+    def weigh(self, inputs: WindowInputs, wanted: IntArray, floors: FloatArray) -> list[FloatArray]:
         """The same for each horizon at so many places, the first ones: J arrays (wanted, n).
 
         Parameters
         ----------
         inputs : of which nothing is unseen.
+        floors : (J) nats up to which it need not be known; it may be -infinity then.
         """
         before = len(self.before)
         points = np.array([before, *(before + self._points_at)])
         offsets = np.concatenate([-self.before, self.ahead])
-        here, *together = self._going_on.mixtures(inputs, offsets, points, np.array([wanted[0], *wanted]))
-        resting = self._resting(inputs, wanted)
-        for rest, mixed in zip(resting, together, strict=True):
-            rest -= mixed
-            rest += here[: len(rest)]
-        return resting
+        return self._going_on.evidence(inputs, offsets, points, np.array([wanted[0], *wanted]), self._at_rest_since, floors)
 
     @cached_property
     def _looks(self) -> Looks:
@@ -189,24 +203,17 @@ class Standstill:
         distances = (np.add.reduceat(moved, starts) - sums * sums / (self._points_at[:, None] + 1)).sum(axis=1)
         return np.asarray(self._constants - distances / 2 - (together - here))
 
-    def _resting(self, inputs: WindowInputs, wanted: IntArray) -> list[FloatArray]:
-        """Log-densities of what follows places up to each horizon, if it is all where it is there: J arrays (wanted, n)."""
-        dof = len(self._rest_stds)
-        offsets, ends = np.repeat([0, *self.ahead], dof), self._points_at * dof
-        squares = self._rest_maps.squares(inputs, offsets, ends, wanted, np.zeros(1))
-        for some, constant in zip(squares, self._constants.tolist(), strict=True):
-            some *= -0.5
-            some += constant
-        return squares
-
     @cached_property
-    def _rest_maps(self) -> WindowMaps:
-        """Of a place and what follows it, that have to do with nothing else, to white noise if it is at rest."""
+    def _at_rest_since(self) -> Other:
+        """What follows a place has to do with nothing but the place: together they are white noise after these maps."""
         since = np.hstack([-self._rest_whitening.sum(axis=1, keepdims=True), self._rest_whitening])
         whitening = np.kron(since, np.diag(1 / self._rest_stds))[None]
         size, dof = whitening.shape[2], len(self._rest_stds)
         signals = np.tile(np.arange(dof), size // dof)
-        return linear_maps(whitening, np.zeros((1, size)), np.zeros((1, size, dof)), signals, np.zeros((1, 1), dtype=np.int64))
+        once = np.zeros((1, 1), dtype=np.int64)
+        maps = linear_maps(whitening, np.zeros((1, size)), np.zeros((1, size, dof)), signals, once)
+        offsets, central = np.repeat([0, *self.ahead], dof), int(np.argmin(np.abs(self.shifts)))
+        return Other(maps, offsets, self._points_at * dof, self._constants, central)
 
     def _rest_constants(self, points: int) -> float:
         """ln of the density of so many points where it is largest."""
@@ -249,13 +256,8 @@ class Pace:
             for ahead in (self.ahead, np.rint(SLOWED * self.ahead).astype(int))
         )
 
-    def weigh(self, inputs: WindowInputs, wanted: IntArray) -> list[FloatArray]:
-        """The same for each horizon at so many places, the first ones: J arrays (wanted, n).
-
-        Parameters
-        ----------
-        inputs : of which nothing is unseen.
-        """
+    def weigh(self, inputs: WindowInputs, wanted: IntArray, floors: FloatArray) -> list[FloatArray]:
+        """The same for each horizon at so many places, the first ones: J arrays (wanted, n); arguments as for `Standstill`."""
         points = len(self.before) + np.array([np.searchsorted(self.ahead, h, "right") for h in self.horizons])
         offsets = np.concatenate([-self.before, self.ahead])
         slowed, going_on = (a.mixtures(inputs, offsets, points, wanted) for a in (self._slowed, self._going_on))

@@ -92,7 +92,8 @@ def judge_recorded(
     durations, dts : (N,) arrays, seconds.
     """
     paths, sensors, n = recorded.paths, recorded.sensors, len(recorded.paths)
-    evidence = expectation.trajectory.evidence(paths.transpose(1, 2, 0), recorded.goals)
+    unsurprising = as_evidence(standard.calibration.least_values(np.zeros(())))
+    evidence = expectation.trajectory.evidence(paths.transpose(1, 2, 0), recorded.goals, unsurprising)
     if np.any(recorded.counts < paths.shape[1]):
         evidence[:, np.arange(paths.shape[1])[:, None] >= recorded.counts] = np.nan
     moments = _moments(standard, evidence)

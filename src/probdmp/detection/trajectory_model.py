@@ -87,18 +87,24 @@ class TrajectoryModel:
         -------
         (n, T, C) array in the order of `channels_for`; the larger, the more suspicious.
         """
-        return as_values(self.evidence(paths.transpose(1, 2, 0), goals)).transpose(2, 1, 0)
+        everything = np.full(len(MOVEMENT_CHANNELS) + len(self.feel), -np.inf)
+        return as_values(self.evidence(paths.transpose(1, 2, 0), goals, everything)).transpose(2, 1, 0)
 
-    def evidence(self, paths: FloatArray, goals: FloatArray) -> FloatArray:
-        """The same before `as_values`, with executions innermost: from paths (T, S, n) to (C, T, n)."""
+    def evidence(self, paths: FloatArray, goals: FloatArray, floors: FloatArray) -> FloatArray:
+        """The same before `as_values`, with executions innermost: from paths (T, S, n) to (C, T, n).
+
+        Parameters
+        ----------
+        floors : (C,) array: what is not above them need not be known, and may be -infinity.
+        """
         n = paths.shape[-1]
         evidence = np.empty((len(MOVEMENT_CHANNELS) + len(self.feel), len(paths), n))
         for begin in range(0, n, SIDE_BY_SIDE):
             part = slice(begin, begin + SIDE_BY_SIDE)
-            self._weigh(np.ascontiguousarray(paths[..., part]), goals[part], evidence[..., part])
+            self._weigh(np.ascontiguousarray(paths[..., part]), goals[part], floors, evidence[..., part])
         return evidence
 
-    def _weigh(self, paths: FloatArray, goals: FloatArray, values: FloatArray) -> None:
+    def _weigh(self, paths: FloatArray, goals: FloatArray, floors: FloatArray, values: FloatArray) -> None:
         unseen, length = np.asarray(np.isnan(paths)), len(paths)
         is_lossy = unseen.any()
         inputs = WindowInputs.of(np.where(unseen, 0.0, paths) if is_lossy else paths, self._whole.ahead(goals).T)
@@ -108,7 +114,8 @@ class TrajectoryModel:
             value[...] = statistic.weigh(inputs, length)
         for evidence, horizons in self._questions:
             wanted = np.maximum(min(length, evidence.last + 1) - np.array(evidence.horizons), 0)
-            for horizon, found in zip(horizons, evidence.weigh(inputs, wanted) if wanted[0] else (), strict=False):
+            own = floors[[horizon.channel for horizon in horizons]]
+            for horizon, found in zip(horizons, evidence.weigh(inputs, wanted, own) if wanted[0] else (), strict=False):
                 values[horizon.channel, horizon.ticks : horizon.ticks + len(found)] = found
         if is_lossy:
             self._look_again(values, paths, unseen, self._whole.means_for(goals))

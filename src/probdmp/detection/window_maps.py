@@ -13,7 +13,7 @@ import numpy as np
 from probdmp.checks import FloatArray, IntArray
 from probdmp.gaussian import kernels
 
-__all__ = ["Densities", "WindowInputs", "WindowMaps", "linear_maps"]
+__all__ = ["Densities", "Other", "WindowInputs", "WindowMaps", "linear_maps"]
 
 
 class WindowInputs(NamedTuple):
@@ -94,10 +94,8 @@ class WindowMaps:
         -------
         J arrays (wanted, n).
         """
-        n = inputs.values.shape[1]
-        found = np.empty(int(wanted.sum()) * n)
-        kernels.least_squares(*self._asked(inputs, offsets, ends, wanted), penalties, found)
-        return kernels.split_sums(found, wanted, n)
+        found = self._squares(inputs, offsets, ends, wanted, penalties)
+        return kernels.split_sums(found, wanted, inputs.values.shape[1])
 
     def mixtures(
         self, inputs: WindowInputs, offsets: IntArray, ends: IntArray, wanted: IntArray, densities: "Densities"
@@ -108,6 +106,41 @@ class WindowMaps:
         bases, n_halves, freedom = densities
         kernels.window_mixtures(*self._asked(inputs, offsets, ends, wanted), bases, n_halves, found, freedom)
         return kernels.split_sums(found, wanted, n)
+
+    def evidence(
+        self,
+        inputs: WindowInputs,
+        offsets: IntArray,
+        ends: IntArray,
+        wanted: IntArray,
+        densities: "Densities",
+        other: "Other",
+        floors: FloatArray,
+    ) -> list[FloatArray]:
+        """Nats that speak for another account of what follows the first end; arguments as above.
+
+        Parameters
+        ----------
+        floors : (J - 1) up to which it need not be known; it is -infinity then.
+
+        Returns
+        -------
+        J - 1 arrays (wanted, n).
+        """
+        maps, points, other_ends, constants, central = other
+        found = maps._squares(inputs, points, other_ends, wanted[1:], np.zeros(1))
+        bases, n_halves, freedom = densities
+        asked = self._asked(inputs, offsets, ends, wanted)
+        kernels.window_evidence(*asked, bases, n_halves, constants, floors, found, freedom, central)
+        return kernels.split_sums(found, wanted[1:], inputs.values.shape[1])
+
+    def _squares(
+        self, inputs: WindowInputs, offsets: IntArray, ends: IntArray, wanted: IntArray, penalties: FloatArray
+    ) -> FloatArray:
+        """Those of `squares`, one array after the other."""
+        found = np.empty(int(wanted.sum()) * inputs.values.shape[1])
+        kernels.least_squares(*self._asked(inputs, offsets, ends, wanted), penalties, found)
+        return found
 
     def _asked(
         self, inputs: WindowInputs, offsets: IntArray, ends: IntArray, wanted: IntArray
@@ -124,6 +157,19 @@ class Densities(NamedTuple):
     n_halves: IntArray
     """(J)"""
     freedom: float
+
+
+class Other(NamedTuple):
+    """Another account of what follows a place, a Gaussian, and which shift is the likeliest one beforehand."""
+
+    maps: WindowMaps
+    offsets: IntArray
+    """Ticks at which each number of a window of its own is seen, relative to the place."""
+    ends: IntArray
+    """(J - 1) outputs up to which it goes."""
+    constants: FloatArray
+    """(J - 1) logarithms of its density where it is largest."""
+    central: int
 
 
 def linear_maps(whitening: FloatArray, means: FloatArray, gains: FloatArray, signals: IntArray, which: IntArray) -> WindowMaps:

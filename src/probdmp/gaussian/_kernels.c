@@ -150,8 +150,10 @@ typedef struct {
     const double *scales;
     const int64_t *n_halves;
     double inverse;
+    const double *constants, *floors; /* of evidence; none where it is not asked for */
+    Py_ssize_t central;
     int64_t *extents; /* to work in: so are the following */
-    double *packed, *window, *sums;
+    double *packed, *window, *sums, *own;
 } Windows;
 
 /* Recordings (N, T, S), and points between their samples: (before - after) beyond + after, less the start, in ranges. */
@@ -171,6 +173,7 @@ typedef struct {
 #define quotient NAMED(quotient)
 #define plus_product NAMED(plus_product)
 #define where_seen NAMED(where_seen)
+#define where_above NAMED(where_above)
 #define step_lane NAMED(step_lane)
 #define store NAMED(store)
 #define times NAMED(times)
@@ -192,7 +195,12 @@ typedef struct {
 #define square_outputs NAMED(square_outputs)
 #define mix_lane NAMED(mix_lane)
 #define least_lane NAMED(least_lane)
+#define log_density NAMED(log_density)
+#define gather NAMED(gather)
+#define put NAMED(put)
 #define look_at_lane NAMED(look_at_lane)
+#define highest_of NAMED(highest_of)
+#define weigh_lane NAMED(weigh_lane)
 #define look_at_windows NAMED(look_at_windows)
 
 #define look_for_odd NAMED(look_for_odd)
@@ -369,7 +377,8 @@ static PyObject *smoothed_states(PyObject *module, PyObject *const *arguments, P
 #define WINDOWS {"values", 0, 2, 0}, {"rows", 0, 2, 1}, {"maps", 0, 3, 0}, {"which", 0, 2, 1}, {"ends", 0, 1, 1}, \
                 {"reach", 0, 1, 1}, {"wanted", 0, 1, 1}
 
-static int windows_fit(const Array *x, const Array *found, Windows *s)
+/* Of the first sums nothing is written. */
+static int windows_fit(const Array *x, const Array *found, Py_ssize_t n_left_out, Windows *s)
 {
     *s = (Windows){
         .n = x[0].view.shape[1], .n_values = x[0].view.shape[0], .n_places = x[1].view.shape[0], .n_inputs = x[1].view.shape[1],
@@ -380,12 +389,12 @@ static int windows_fit(const Array *x, const Array *found, Windows *s)
     if (!agree(&x[2], "maps", s->n_maps, s->n_outputs, s->n_inputs, 0) || !agree(&x[5], "reach", s->n_outputs, 0, 0, 0)
         || !agree(&x[6], "wanted", s->n_sums, 0, 0, 0))
         return 0;
-    int is_sound = s->n_sums > 0 && s->n_mapped > 0 && s->n_inputs > 0 && s->n_accounts > 0;
+    int is_sound = s->n_sums > n_left_out && s->n_mapped > 0 && s->n_inputs > 0 && s->n_accounts > 0;
     Py_ssize_t size = 0;
     for (Py_ssize_t j = 0; is_sound && j < s->n_sums; j++) {
         is_sound = s->ends[j] > (j ? s->ends[j - 1] : 0) && s->ends[j] <= s->n_outputs && s->wanted[j] >= 0
                    && s->wanted[j] <= (j ? s->wanted[j - 1] : s->n_places);
-        size += s->wanted[j] * s->n;
+        size += j < n_left_out ? 0 : s->wanted[j] * s->n;
     }
     for (Py_ssize_t i = 0; is_sound && i < s->n_outputs; i++)
         is_sound = s->reach[i] >= (i ? s->reach[i - 1] : 0) && s->reach[i] <= s->n_inputs;
@@ -402,14 +411,16 @@ static int windows_fit(const Array *x, const Array *found, Windows *s)
 /* Looks at windows that fit; 0 without memory. */
 static int look(Windows *s, double *found)
 {
-    const Py_ssize_t groups = s->n_outputs * s->n_accounts / OUTPUTS + s->n_sums, k = s->n_inputs;
-    double *work = malloc((groups * OUTPUTS * k + (k + s->n_accounts + 1) * WIDTH) * sizeof(double));
-    s->extents = malloc(groups * sizeof(int64_t));
+    const Py_ssize_t groups = s->n_outputs * s->n_accounts / OUTPUTS + s->n_sums, own = s->n_outputs / OUTPUTS + s->n_sums;
+    const Py_ssize_t k = s->n_inputs;
+    double *work = malloc(((groups + own) * OUTPUTS * k + (k + s->n_accounts + 1) * WIDTH) * sizeof(double));
+    s->extents = malloc((groups + own) * sizeof(int64_t));
     const int has_memory = work != NULL && s->extents != NULL;
     if (has_memory) {
         s->window = work + (-(uintptr_t)work / sizeof(double)) % WIDTH; /* where a lane begins with a line of the cache */
         s->sums = s->window + k * WIDTH;
         s->packed = s->sums + s->n_accounts * WIDTH;
+        s->own = s->packed + groups * OUTPUTS * k;
         Py_BEGIN_ALLOW_THREADS
         CHOOSE(look_at_windows)(s, found);
         Py_END_ALLOW_THREADS
@@ -427,7 +438,7 @@ static PyObject *least_squares(PyObject *module, PyObject *const *arguments, Py_
     Array x[COUNT];
     Windows s;
     if (take(arguments, given, specs, COUNT, x) < 0) return NULL;
-    int done = windows_fit(x, &x[COUNT - 1], &s) && agree(&x[7], "penalties", s.n_accounts, 0, 0, 0);
+    int done = windows_fit(x, &x[COUNT - 1], 0, &s) && agree(&x[7], "penalties", s.n_accounts, 0, 0, 0);
     if (done) {
         s.penalties = x[7].data;
         done = look(&s, x[COUNT - 1].data);
@@ -449,12 +460,47 @@ static PyObject *window_mixtures(PyObject *module, PyObject *const *arguments, P
     }
     const double freedom = PyFloat_AsDouble(arguments[COUNT]);
     if (PyErr_Occurred() || take(arguments, COUNT, specs, COUNT, x) < 0) return NULL;
-    int done = windows_fit(x, &x[COUNT - 1], &s);
+    int done = windows_fit(x, &x[COUNT - 1], 0, &s);
     done = done && agree(&x[7], "scales", s.n_mapped, s.n_sums, s.n_accounts, 0) && agree(&x[8], "n_halves", s.n_sums, 0, 0, 0);
     if (done) {
         s.scales = x[7].data;
         s.n_halves = x[8].integers;
         s.inverse = 1 / freedom;
+        done = look(&s, x[COUNT - 1].data);
+    }
+    release(x, COUNT);
+    if (!done) return NULL;
+    Py_RETURN_NONE;
+}
+
+static PyObject *window_evidence(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
+{
+    static const Spec specs[] = {WINDOWS, {"scales", 0, 3, 0}, {"n_halves", 0, 1, 1}, {"constants", 0, 1, 0}, {"floors", 0, 1, 0},
+                                 {"found", 1, 1, 0}};
+    enum { COUNT = sizeof(specs) / sizeof(specs[0]) };
+    Array x[COUNT];
+    Windows s;
+    if (given != COUNT + 2) {
+        PyErr_Format(PyExc_TypeError, "expected %d arrays and two numbers, got %zd arguments", COUNT, given);
+        return NULL;
+    }
+    const double freedom = PyFloat_AsDouble(arguments[COUNT]);
+    const Py_ssize_t central = PyErr_Occurred() ? -1 : PyLong_AsSsize_t(arguments[COUNT + 1]);
+    if (PyErr_Occurred() || take(arguments, COUNT, specs, COUNT, x) < 0) return NULL;
+    int done = windows_fit(x, &x[COUNT - 1], 1, &s);
+    done = done && agree(&x[7], "scales", s.n_mapped, s.n_sums, s.n_accounts, 0) && agree(&x[8], "n_halves", s.n_sums, 0, 0, 0)
+           && agree(&x[9], "constants", s.n_sums - 1, 0, 0, 0) && agree(&x[10], "floors", s.n_sums - 1, 0, 0, 0);
+    if (done && (central < 0 || central >= s.n_accounts)) {
+        PyErr_Format(PyExc_ValueError, "expected one of %zd accounts as the central one, got %zd", s.n_accounts, central);
+        done = 0;
+    }
+    if (done) {
+        s.scales = x[7].data;
+        s.n_halves = x[8].integers;
+        s.constants = x[9].data;
+        s.floors = x[10].data;
+        s.inverse = 1 / freedom;
+        s.central = central;
         done = look(&s, x[COUNT - 1].data);
     }
     release(x, COUNT);
@@ -517,7 +563,7 @@ static PyObject *points_on_lines(PyObject *module, PyObject *const *arguments, P
 
 static PyMethodDef functions[] = {
     FUNCTION(filter_systems), FUNCTION(filter_step), FUNCTION(squared_innovations), FUNCTION(smoothed_states),
-    FUNCTION(least_squares), FUNCTION(window_mixtures), FUNCTION(plain_recordings), FUNCTION(points_on_lines),
+    FUNCTION(least_squares), FUNCTION(window_mixtures), FUNCTION(window_evidence), FUNCTION(plain_recordings), FUNCTION(points_on_lines),
     {NULL, NULL, 0, NULL},
 };
 
@@ -718,6 +764,15 @@ INLINE Lane where_seen(Lane x, Lane e)
     for (int i = 0; i < PARTS; i++) x.part[i] = isnan(e.part[i]) ? 0 : x.part[i];
 #endif
     return x;
+}
+
+/* x, but -infinity where it is not above a number */
+INLINE Lane where_above(Lane x, double floor)
+{
+    double numbers[WIDTH];
+    store(numbers, x);
+    for (int w = 0; w < WIDTH; w++) numbers[w] = numbers[w] > floor ? numbers[w] : -INFINITY;
+    return load(numbers);
 }
 
 /* ---- filter_step -------------------------------------------------------------------------------------------------------- */
@@ -956,15 +1011,15 @@ static void smooth_all(int n, const Series *s, const double *predicted, const do
 
 /* ---- Windows ------------------------------------------------------------------------------------------------------------ */
 
-/* Rows of the maps of a place in the order in which they are multiplied: those that each sum adds, by output and account, OUTPUTS
-   at a time, column by column as far as they reach. They stay in the cache for all executions. */
-INLINE void pack(const Windows *s, const int64_t *which)
+/* Rows of the maps of some accounts of a place in the order in which they are multiplied: those that each sum adds, by output and
+   account, OUTPUTS at a time, column by column as far as they reach. They stay in the cache for all executions. */
+INLINE void pack(const Windows *s, const int64_t *which, Py_ssize_t a, Py_ssize_t first_sum, double **packed, int64_t **extents)
 {
-    const Py_ssize_t a = s->n_accounts, k = s->n_inputs;
-    double *to = s->packed;
-    int64_t *extent = s->extents;
-    Py_ssize_t begin = 0;
-    for (Py_ssize_t j = 0; j < s->n_sums; j++) {
+    const Py_ssize_t k = s->n_inputs;
+    double *to = *packed;
+    int64_t *extent = *extents;
+    Py_ssize_t begin = first_sum ? s->ends[first_sum - 1] * a : 0;
+    for (Py_ssize_t j = first_sum; j < s->n_sums; j++) {
         const Py_ssize_t end = s->ends[j] * a;
         for (Py_ssize_t i = begin; i < end; i += OUTPUTS) {
             const Py_ssize_t last = i + OUTPUTS < end ? i + OUTPUTS - 1 : end - 1, used = s->reach[last / a];
@@ -978,10 +1033,13 @@ INLINE void pack(const Windows *s, const int64_t *which)
         }
         begin = end;
     }
+    *packed = to;
+    *extents = extent;
 }
 
-/* Adds the squares of some groups of outputs of a window to the sums of the accounts. */
-INLINE const double *square_outputs(const Windows *s, const double *packed, const int64_t *extents, Py_ssize_t n_groups)
+/* Adds the squares of some groups of outputs of a window to the sums of as many accounts. */
+INLINE const double *square_outputs(const Windows *s, const double *packed, const int64_t *extents, Py_ssize_t n_groups,
+                                    Py_ssize_t n_accounts, double *sums)
 {
     Py_ssize_t account = 0;
     for (Py_ssize_t g = 0; g < n_groups; g++) {
@@ -992,9 +1050,9 @@ INLINE const double *square_outputs(const Windows *s, const double *packed, cons
             UNROLL for (int o = 0; o < OUTPUTS; o++) sum[o] = plus(sum[o], packed[o], x);
         }
         UNROLL for (int o = 0; o < OUTPUTS; o++) {
-            double *of = s->sums + account * WIDTH;
+            double *of = sums + account * WIDTH;
             store(of, plus_product(load(of), sum[o], sum[o]));
-            account = account + 1 < s->n_accounts ? account + 1 : 0;
+            account = account + 1 < n_accounts ? account + 1 : 0;
         }
     }
     return packed;
@@ -1033,37 +1091,109 @@ INLINE Lane least_lane(const Windows *s)
     return least;
 }
 
-/* What is asked about one place of some executions, up to each end: arrays (wanted, n), one after the other. */
-INLINE void look_at_lane(const Windows *s, Py_ssize_t place, Py_ssize_t mapped, Py_ssize_t first, Py_ssize_t width, double *found)
+/* ln (scale (1 + square / freedom))^-(n_halves / 2): of one account. */
+INLINE Lane log_density(const Windows *s, double scale, Lane square, Py_ssize_t n_halves)
 {
-    const Py_ssize_t a = s->n_accounts, n = s->n;
-    const double *packed = s->packed;
-    const int64_t *extents = s->extents, *rows = s->rows + place * s->n_inputs;
+    return times(-n_halves / 2.0, logarithm(plus_number(times(scale * s->inverse, square), scale)));
+}
+
+/* The windows of some executions at a place. */
+INLINE void gather(const Windows *s, Py_ssize_t place, Py_ssize_t first, Py_ssize_t width)
+{
+    const int64_t *rows = s->rows + place * s->n_inputs;
     for (Py_ssize_t k = 0; k < s->n_inputs; k++) {
-        const double *from = s->values + rows[k] * n + first;
+        const double *from = s->values + rows[k] * s->n + first;
         if (width == WIDTH)
             store(s->window + k * WIDTH, load(from));
         else
             for (int w = 0; w < WIDTH; w++) s->window[k * WIDTH + w] = w < width ? from[w] : 0;
     }
+}
+
+INLINE void put(double *to, Lane answer, Py_ssize_t width)
+{
+    double some[WIDTH];
+    if (width == WIDTH) {
+        store(to, answer);
+        return;
+    }
+    store(some, answer);
+    memcpy(to, some, width * sizeof(double));
+}
+
+/* What is asked about one place of some executions, up to each end: arrays (wanted, n), one after the other. */
+INLINE void look_at_lane(const Windows *s, Py_ssize_t place, Py_ssize_t mapped, Py_ssize_t first, Py_ssize_t width, double *found)
+{
+    const Py_ssize_t a = s->n_accounts, n = s->n;
+    const double *packed = s->packed;
+    const int64_t *extents = s->extents;
+    gather(s, place, first, width);
     memset(s->sums, 0, a * WIDTH * sizeof(double));
     Py_ssize_t begin = 0;
     for (Py_ssize_t j = 0; j < s->n_sums && place < s->wanted[j]; j++) {
         const Py_ssize_t n_groups = ((s->ends[j] - begin) * a + OUTPUTS - 1) / OUTPUTS;
-        packed = square_outputs(s, packed, extents, n_groups);
+        packed = square_outputs(s, packed, extents, n_groups, a, s->sums);
         extents += n_groups;
         begin = s->ends[j];
         const double *scales = s->scales + (mapped * s->n_sums + j) * a;
-        const Lane answer = s->penalties ? least_lane(s) : mix_lane(s, scales, s->n_halves[j]);
-        double *to = found + place * n + first;
-        if (width == WIDTH)
-            store(to, answer);
-        else {
-            double some[WIDTH];
-            store(some, answer);
-            memcpy(to, some, width * sizeof(double));
-        }
+        put(found + place * n + first, s->penalties ? least_lane(s) : mix_lane(s, scales, s->n_halves[j]), width);
         found += s->wanted[j] * n;
+    }
+}
+
+INLINE double highest_of(Lane x, Py_ssize_t width)
+{
+    double numbers[WIDTH], highest = -INFINITY;
+    store(numbers, x);
+    for (Py_ssize_t w = 0; w < width; w++) highest = numbers[w] > highest ? numbers[w] : highest;
+    return highest;
+}
+
+/* Evidence at one place of some executions, where it is above its floor. What all accounts say is at least what one of them says,
+   so most of them need not be asked: at most places there is none. */
+INLINE void weigh_lane(const Windows *s, Py_ssize_t place, Py_ssize_t mapped, Py_ssize_t first, Py_ssize_t width, double *found)
+{
+    const Py_ssize_t a = s->n_accounts, n = s->n, before = (s->ends[0] * a + OUTPUTS - 1) / OUTPUTS;
+    const double *scales = s->scales + mapped * s->n_sums * a, *own_packed = s->own;
+    const int64_t *own_extents = s->extents;
+    Py_ssize_t n_asked = 0, begin = s->ends[0];
+    for (Py_ssize_t j = 0, start = 0; j < s->n_sums; start = s->ends[j++])
+        own_extents += ((s->ends[j] - start) * a + OUTPUTS - 1) / OUTPUTS;
+    gather(s, place, first, width);
+    memset(s->sums, 0, a * WIDTH * sizeof(double));
+    const double *packed = square_outputs(s, s->packed, s->extents, before, a, s->sums);
+    const int64_t *extents = s->extents + before;
+    const Lane here = mix_lane(s, scales, s->n_halves[0]), nothing = plus_number(times(0.0, here), -INFINITY);
+    double own[WIDTH], *to = found + place * n + first;
+    store(own, load(s->sums + s->central * WIDTH));
+    for (Py_ssize_t j = 1; j < s->n_sums && place < s->wanted[j]; j++, to += s->wanted[j - 1] * n) {
+        const Py_ssize_t n_groups = (s->ends[j] - begin + OUTPUTS - 1) / OUTPUTS;
+        own_packed = square_outputs(s, own_packed, own_extents, n_groups, 1, own);
+        own_extents += n_groups;
+        begin = s->ends[j];
+        double rest[WIDTH] = {0};
+        memcpy(rest, to, width * sizeof(double));
+        const Lane other = plus_number(times(-0.5, load(rest)), s->constants[j - 1]);
+        const Lane least = log_density(s, scales[j * a + s->central], load(own), s->n_halves[j]);
+        const Lane most = plus(plus(other, 1.0, here), -1.0, least);
+        put(to, other, width);
+        if (highest_of(most, width) > s->floors[j - 1]) n_asked = j;
+    }
+    to = found + place * n + first;
+    begin = s->ends[0];
+    for (Py_ssize_t j = 1; j < s->n_sums && place < s->wanted[j]; j++, to += s->wanted[j - 1] * n) {
+        Lane answer = nothing;
+        if (j <= n_asked) {
+            const Py_ssize_t n_groups = ((s->ends[j] - begin) * a + OUTPUTS - 1) / OUTPUTS;
+            packed = square_outputs(s, packed, extents, n_groups, a, s->sums);
+            extents += n_groups;
+            begin = s->ends[j];
+            double other[WIDTH] = {0};
+            memcpy(other, to, width * sizeof(double));
+            const Lane evidence = plus(plus(load(other), 1.0, here), -1.0, mix_lane(s, scales + j * a, s->n_halves[j]));
+            answer = where_above(evidence, s->floors[j - 1]);
+        }
+        put(to, answer, width);
     }
 }
 
@@ -1071,9 +1201,21 @@ static void look_at_windows(const Windows *s, double *found)
 {
     for (Py_ssize_t place = 0; place < s->wanted[0]; place++) {
         const Py_ssize_t mapped = place < s->n_mapped ? place : s->n_mapped - 1;
-        pack(s, s->which + mapped * s->n_accounts);
-        for (Py_ssize_t first = 0; first < s->n; first += WIDTH)
-            look_at_lane(s, place, mapped, first, s->n - first < WIDTH ? s->n - first : WIDTH, found);
+        const int64_t *which = s->which + mapped * s->n_accounts;
+        double *packed = s->packed;
+        int64_t *extents = s->extents;
+        pack(s, which, s->n_accounts, 0, &packed, &extents);
+        if (s->constants) {
+            packed = s->own;
+            pack(s, which + s->central, 1, 1, &packed, &extents);
+        }
+        for (Py_ssize_t first = 0; first < s->n; first += WIDTH) {
+            const Py_ssize_t width = s->n - first < WIDTH ? s->n - first : WIDTH;
+            if (s->constants)
+                weigh_lane(s, place, mapped, first, width, found);
+            else
+                look_at_lane(s, place, mapped, first, width, found);
+        }
     }
 }
 

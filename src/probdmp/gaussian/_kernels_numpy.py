@@ -13,6 +13,7 @@ from probdmp.gaussian._recordings_numpy import (
     plain_recordings,
     points_on_lines,
     split_sums,
+    window_evidence,
     window_mixtures,
 )
 
@@ -25,6 +26,7 @@ __all__ = [
     "smoothed_states",
     "split_sums",
     "squared_innovations",
+    "window_evidence",
     "window_mixtures",
 ]
 

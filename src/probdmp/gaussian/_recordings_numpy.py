@@ -7,7 +7,7 @@ import numpy as np
 
 from probdmp.checks import FloatArray, IntArray
 
-__all__ = ["least_squares", "plain_recordings", "points_on_lines", "split_sums", "window_mixtures"]
+__all__ = ["least_squares", "plain_recordings", "points_on_lines", "split_sums", "window_evidence", "window_mixtures"]
 
 FEW = 16
 """Executions up to which all places are multiplied at once: then the calls cost more than the numbers."""
@@ -139,6 +139,44 @@ def window_mixtures(
     for j, (some, mixed) in enumerate(zip(sums, mixtures, strict=True)):
         own = scales[np.minimum(np.arange(len(some)), len(scales) - 1), j]
         _mix(some, own, mixed, int(n_halves[j]), freedom)
+
+
+def window_evidence(
+    values: FloatArray,
+    rows: IntArray,
+    maps: FloatArray,
+    which: IntArray,
+    ends: IntArray,
+    reach: IntArray,
+    wanted: IntArray,
+    scales: FloatArray,
+    n_halves: IntArray,
+    constants: FloatArray,
+    floors: FloatArray,
+    found: FloatArray,
+    freedom: float,
+    central: int,
+) -> None:
+    """Evidence for another account of what comes after the first part of a window: ln p(all | other) - ln p(all) + ln p(first).
+
+    p are the mixtures of `window_mixtures`, the last one up to the first end. What is not above its floor is -infinity.
+
+    Parameters
+    ----------
+    constants, floors : (J - 1) of the other account, whose ln p is constant - square / 2.
+    found : written: J - 1 arrays (wanted, n), one after the other; holds these squares before.
+    central : the account that is asked first.
+    """
+    mixtures = np.empty(int(wanted.sum()) * values.shape[1])
+    window_mixtures(values, rows, maps, which, ends, reach, wanted, scales, n_halves, mixtures, freedom)
+    here, *together = split_sums(mixtures, wanted, values.shape[1])
+    of_each = zip(split_sums(found, wanted[1:], values.shape[1]), together, constants, floors, strict=True)
+    for some, mixed, constant, floor in of_each:
+        some *= -0.5
+        some += constant
+        some += here[: len(some)]
+        some -= mixed
+        some[some <= floor] = -np.inf
 
 
 def split_sums(found: FloatArray, wanted: IntArray, n: int) -> list[FloatArray]:

@@ -24,6 +24,7 @@ __all__ = [
     "smoothed_states",
     "split_sums",
     "squared_innovations",
+    "window_evidence",
     "window_mixtures",
 ]
 
@@ -56,6 +57,7 @@ squared_innovations: Callable[..., None] = _kernels.squared_innovations
 smoothed_states: Callable[..., None] = _kernels.smoothed_states
 least_squares: Callable[..., None] = _kernels.least_squares
 window_mixtures: Callable[..., None] = _kernels.window_mixtures
+window_evidence: Callable[..., None] = _kernels.window_evidence
 plain_recordings: Callable[..., None] = _kernels.plain_recordings
 points_on_lines: Callable[..., None] = _kernels.points_on_lines
 split_sums = _kernels_numpy.split_sums
