@@ -21,7 +21,7 @@ __all__ = ["PathWindows", "WhiteWindows", "gather", "inverse_of_cholesky", "whit
 
 LOSSY_AT_ONCE = 64
 """Windows of which something was not seen that are factorised at once."""
-SUBSTITUTED = 16
+SUBSTITUTED = 8
 """Rows up to which a triangle is inverted row by row."""
 
 
@@ -133,11 +133,10 @@ class PathWindows:
         self._dof = model.means.shape[1]
         self._of_pairs = model.covariance.swapaxes(1, 2).reshape(-1, self._dof, self._dof)
         self._noise = np.diag(np.tile(model.noise_variances, len(self.offsets)))
-        mix = np.eye(len(self.offsets)) if combination is None else combination
-        self._unmixed = np.kron(np.linalg.pinv(mix), np.eye(self._dof))
         whitening = inverse_of_cholesky(self._covariances(pairs))
         if combination is not None:
-            whitening = whitening @ np.kron(mix, np.eye(self._dof))
+            self._unmixed = np.kron(np.linalg.pinv(combination), np.eye(self._dof))
+            whitening = whitening @ np.kron(combination, np.eye(self._dof))
         means = model.means[ticks].reshape(len(ticks), -1)
         gains = model.goal_gains[ticks].reshape(*means.shape, -1)
         signals = np.tile(np.arange(self._dof), len(self.offsets))
