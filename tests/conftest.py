@@ -16,7 +16,7 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "fast"))
 
 @pytest.fixture(scope="module", autouse=True)
 def kept_to_the_end() -> None:
-    """Garbage is not looked for among modules and collected tests, which took 7 % of the time; nor after a test that undoes it."""
+    """Garbage is not looked for among modules and collected tests: 7 % of the time. Once more after a test that undoes it."""
     if gc.get_freeze_count() == 0:
         gc.collect()
         gc.freeze()
