@@ -5,6 +5,9 @@ BIN := $(VENV)/bin
 
 BENCH := benchmarks/.venv
 
+# Byte code is kept, whatever the shell says: to compile every test for every worker, and the library for every process, takes a minute.
+export PYTHONDONTWRITEBYTECODE :=
+
 # What pictures of the examples depend on: they are drawn again when the library changes.
 SOURCES := $(shell find src -name '*.py')
 GALLERY := $(patsubst examples/%.py,build/gallery/%.png,$(wildcard examples/*.py))

@@ -109,10 +109,25 @@ def dense_joint(system, digits=None):
             G[t] = A @ G[t - 1]
             G[t][:, e] += B
             sources[e, e] = U[t - 1]
-        rows = G.reshape(T * n, n_sources)
-        states = (rows @ sources @ rows.T).reshape(T, n, T, n)
-        cross = np.tensordot(C, states, (1, 1)).swapaxes(0, 1)
-        return _seen_through(C, R, means, states, cross)
+        return _seen_through(C, R, means, *_of_states(G, sources, n, m, C))
+
+
+def _of_states(G, sources, n, m, C):
+    """G sources G^T (T, n, T, n), and C times it. Of these products, terms that are zero are left out: most, and all cost time.
+
+    Sources are independent between times, and no state depends on sources after it.
+    """
+    T, _, n_sources = G.shape
+    rows, driven = G.reshape(T * n, n_sources), np.zeros((T * n, n_sources), G.dtype)
+    for block in (slice(0, n), *(slice(k, k + m) for k in range(n, n_sources, m))):
+        driven[:, block] = rows[:, block] @ sources[block, block]
+    states = np.zeros((T * n, T * n), G.dtype)
+    for t in range(T):
+        here, later, known = slice(t * n, (t + 1) * n), slice(t * n, T * n), slice(0, n + t * m)
+        states[here, later] = driven[here, known] @ rows[later, known].T
+        states[later, here] = states[here, later].T
+    states = states.reshape(T, n, T, n)
+    return states, np.tensordot(C, states, (1, 1)).swapaxes(0, 1)
 
 
 def _seen_through(C, R, means, states, cross):

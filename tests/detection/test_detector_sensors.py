@@ -49,7 +49,7 @@ def spoken(written, seed):
 
 @pytest.fixture(scope="module")
 def letters():
-    return [spoken(written, k) for k, written in enumerate(written_letters(TRAINED + JUDGED, letters="s", dt=0.01))]
+    return [spoken(written, k) for k, written in enumerate(written_letters(TRAINED + JUDGED, letters="s", dt=0.02))]
 
 
 @pytest.fixture(scope="module")

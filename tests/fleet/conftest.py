@@ -41,7 +41,7 @@ def fleet(tmp_path_factory) -> Fleet:
     folder = tmp_path_factory.mktemp("fleet")
     taught, executions = {}, []
     for label in "cl":
-        recordings = synthetic_letters(12, seed=1, letters=label, dt=0.02)
+        recordings = synthetic_letters(12, seed=1, letters=label, dt=0.03)
         taught[label], new = recordings[:8], recordings[8:]
         rng = np.random.default_rng(0)
         executions += [*new, replace(new[0], positions=hold(new[0].positions, new[0].n_samples // 2, rng))]

@@ -106,6 +106,8 @@ class Calibration:
     @cached_property
     def suspects(self) -> dict[str, float]:
         """Primitives that may raise more alarms than the others: label to the share of its executions in the common tail."""
+        if len(set(self.labels)) < 2:  # nobody takes a share from others
+            return {}
         share = max(self.false_alarm_rate, SUSPICIOUS_SHARE)
         in_tail = self.statistics > np.quantile(self.statistics, 1 - share)
         of_each = {label: np.array([own == label for own in self.labels]) for label in sorted(set(self.labels))}

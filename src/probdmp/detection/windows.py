@@ -6,6 +6,8 @@ covariances are factorised once: Sigma_window + R = L L^T, and z = L^-1 (window 
 so the first entries of z say how likely the beginning of a window is, whatever follows.
 """
 
+from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +21,7 @@ __all__ = ["PathWindows", "WhiteWindows", "gather", "inverse_of_cholesky", "whit
 
 LOSSY_AT_ONCE = 64
 """Windows of which something was not seen that are factorised at once."""
-SUBSTITUTED = 16
+SUBSTITUTED = 8
 """Rows up to which a triangle is inverted row by row."""
 
 
@@ -79,6 +81,37 @@ def _invert_triangles(factors: FloatArray, inverses: FloatArray) -> None:
         inverses[..., i, :i] = -scale[..., None] * above
 
 
+class WindowTicks(NamedTuple):
+    """Where windows of one shape lie on a movement, which is the same for every model; read-only."""
+
+    ticks: IntArray
+    """(T, S, P) array: ticks of the points at every place and shift."""
+    distinct: IntArray
+    """(U, P) array: the same without repetition. A place at one shift is another place at another, but near the ends."""
+    of_each: IntArray
+    """(T, S) array: which of them each one is."""
+    pairs: IntArray
+    """(U, P, P) array: every two points of each of them, as `tick_pairs`."""
+
+
+def tick_pairs(ticks: IntArray) -> IntArray:
+    """Every two points of windows at ticks (…, P) as rows of a table of all pairs of ticks: (…, P, P) array."""
+    return np.asarray(ticks[..., :, None] * (TICKS + 1) + ticks[..., None, :])
+
+
+@lru_cache(maxsize=64)
+def window_ticks(offsets: Sequence[int], shifts: Sequence[int], n_places: int) -> WindowTicks:
+    """Arguments as for `PathWindows`."""
+    ticks = np.arange(n_places)[:, None, None] + np.array(offsets)
+    # Before the start there is no tempo.
+    ticks = np.where(ticks <= 0, 0, np.clip(ticks + np.array(shifts)[:, None], 0, TICKS))
+    distinct, of_each = np.unique(ticks.reshape(-1, len(offsets)), axis=0, return_inverse=True)
+    found = WindowTicks(ticks, distinct, np.ascontiguousarray(of_each.reshape(ticks.shape[:2])), tick_pairs(distinct))
+    for array in found:
+        array.flags.writeable = False
+    return found
+
+
 class PathWindows:
     """Windows of one shape at every place of a movement.
 
@@ -96,28 +129,26 @@ class PathWindows:
     ) -> None:
         self.offsets, self.shifts = np.asarray(offsets), np.asarray(shifts)
         self._combination = combination
-        ticks = np.arange(n_places)[:, None, None] + self.offsets
-        # Before the start there is no tempo: (T, S, P)
-        self._ticks = np.where(ticks <= 0, 0, np.clip(ticks + self.shifts[:, None], 0, TICKS))
-        n_ticks, self._dof = model.means.shape
-        self._whole = model.covariance.reshape(n_ticks * self._dof, -1)
+        self._ticks, ticks, of_each, pairs = window_ticks(tuple(self.offsets.tolist()), tuple(self.shifts.tolist()), n_places)
+        self._dof = model.means.shape[1]
+        self._of_pairs = model.covariance.swapaxes(1, 2).reshape(-1, self._dof, self._dof)
         self._noise = np.diag(np.tile(model.noise_variances, len(self.offsets)))
-        mix = np.eye(len(self.offsets)) if combination is None else combination
-        self._unmixed = np.kron(np.linalg.pinv(mix), np.eye(self._dof))
-        # A place at one shift is another place at another shift, but near the ends: each is factorised once.
-        ticks, of_each = np.unique(self._ticks.reshape(-1, len(self.offsets)), axis=0, return_inverse=True)
-        whitening = inverse_of_cholesky(self._covariances(ticks))
+        whitening = inverse_of_cholesky(self._covariances(pairs))
         if combination is not None:
-            whitening = whitening @ np.kron(mix, np.eye(self._dof))
+            self._unmixed = np.kron(np.linalg.pinv(combination), np.eye(self._dof))
+            whitening = whitening @ np.kron(combination, np.eye(self._dof))
         means = model.means[ticks].reshape(len(ticks), -1)
         gains = model.goal_gains[ticks].reshape(*means.shape, -1)
         signals = np.tile(np.arange(self._dof), len(self.offsets))
-        self.maps = linear_maps(whitening, means, gains, signals, of_each.reshape(self._ticks.shape[:2]))
+        self.maps = linear_maps(whitening, means, gains, signals, of_each)
 
-    def _covariances(self, ticks: IntArray) -> FloatArray:
-        """Of windows at ticks (…, S, P) of the movement, noise included: (…, S, L D, L D) array."""
-        rows = (ticks[..., None] * self._dof + np.arange(self._dof)).reshape(*ticks.shape[:-1], -1)
-        covariances = self._whole[rows[..., :, None], rows[..., None, :]] + self._noise
+    def _covariances(self, pairs: IntArray) -> FloatArray:
+        """Of windows with points in these pairs (…, P, P), noise included: (…, L D, L D) array."""
+        size = pairs.shape[-1] * self._dof
+        # One row of a table of all pairs is copied at once, far faster than numbers from here and there.
+        blocks = np.take(self._of_pairs, pairs, axis=0)  # (…, P, P, D, D)
+        covariances = blocks.swapaxes(-3, -2).reshape(*pairs.shape[:-2], size, size)
+        covariances += self._noise
         if self._combination is None:
             return covariances
         combination = np.kron(self._combination, np.eye(self._dof))
@@ -225,7 +256,7 @@ class PathWindows:
     def _without_unseen(self, rows: IntArray, residuals: FloatArray) -> tuple[FloatArray, FloatArray]:
         """What was seen of windows (W, S, size) whitened by itself: z and the logarithms of the diagonal, zero elsewhere."""
         size, seen = residuals.shape[-1], ~np.isnan(residuals)
-        covariances = self._covariances(self._ticks[rows])[..., :size, :size]
+        covariances = self._covariances(tick_pairs(self._ticks[rows]))[..., :size, :size]
         # What was not seen is given a variance of its own and a deviation of zero, which says nothing of the rest.
         covariances = np.where(seen[..., None] & seen[..., None, :], covariances, np.eye(size))
         white, logarithms = whitened(covariances, np.where(seen, residuals, 0.0))
