@@ -34,7 +34,7 @@ export function startConnection() {
     const lost = before?.labels.reduce((sum, one) => sum + one.strokes.length, 0) ?? 0;
     if (before && before.session !== state.session && lost && !state.labels.some((one) => one.strokes.length)) {
       const strokes = before;
-      emit("toast", { text: `The server was started again; your ${lost} strokes were taught to it again.` });
+      emit("toast", { text: `The server was started again; your ${lost} strokes were taught to it again.`, stays: true });
       before = state;
       teachAgain(strokes);
       return;
