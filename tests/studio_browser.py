@@ -50,7 +50,7 @@ class Studio:
         self.complaints.clear()
 
     def wait(self, read: Callable[[], Any], is_right: Callable[[Any], bool], wanted: str) -> Any:
-        """What is read, once it is right. Playwright's own waiting asks twice a second at best, or needs eval, which is forbidden."""
+        """What is read, once it is right. Playwright itself asks twice a second, or needs eval, which the page forbids."""
         end = time.monotonic() + LONG
         while not is_right(found := read()):
             assert time.monotonic() < end, f"after {LONG:g} s not {wanted}, but {found!r:.500}"

@@ -113,7 +113,9 @@ def test_a_session_that_is_opened_twice_stays_with_the_newer_page(
 ) -> None:
     studio.teach(strokes=1)
     newer = open_studio(server)
-    newer.page.evaluate("id => sessionStorage.setItem('session', id)", studio.page.evaluate("sessionStorage.getItem('session')"))
+    newer.page.evaluate(
+        "id => sessionStorage.setItem('session', id)", studio.page.evaluate("sessionStorage.getItem('session')")
+    )
     newer.open(server.url)
     newer.lists(".count", "1 stroke, learned")
     studio.says("#banner", "open in another tab")
@@ -124,7 +126,9 @@ def test_a_session_that_is_opened_twice_stays_with_the_newer_page(
 
 def test_a_server_that_was_started_again_is_taught_again(open_studio: Callable[..., Studio], own_server: Any) -> None:
     studio = open_studio(own_server)
-    studio.teach(strokes=3)
+    for k in range(3):
+        studio.draw(shift=k - 1)
+        studio.counts("#strokes li", k + 1)
     own_server.stop()
     studio.says("#banner", "The connection to the server is lost")
     studio.page.click("#banner button")  # while it is away: later the page may come back by itself before the click

@@ -2,6 +2,7 @@
 
 import { emit, on } from "./bus.js";
 import { byId, setText } from "./dom.js";
+import { again } from "./ink.js";
 import { connect, send } from "./socket.js";
 
 let before = null; // the last state of the session that this page showed
@@ -17,7 +18,7 @@ function show(text, action, act) {
 
 function teachAgain(state) {
   for (const { name, strokes } of state.labels) {
-    for (const { points } of strokes) send("stroke", { label: name, points: points.map(([t, x, y]) => [t, x, y, null]) });
+    for (const { points } of strokes) send("stroke", { label: name, points: again(points) });
   }
   if (state.selected) send("select", { label: state.selected });
 }
