@@ -73,7 +73,8 @@ def calibration_view(session: Session) -> dict[str, Any] | None:
     if movement is None or movement.learned is None:
         return None
     detector, identity = session.detectors.get(session.selected or ""), movement.learned.primitive_.identity
-    unknown = {"n": 0, "attainable": None, "alpha": session.settings.alpha, "guarantee": "none"}
+    note = session.calibration_note
+    unknown = {"n": 0, "attainable": None, "alpha": session.settings.alpha, "guarantee": "none", "note": note}
     if detector is None or identity not in {p.identity for p in detector.primitives_.values()}:
         why = session.calibration_problem
         return unknown | {"text": f"Not calibrated. {why}" if why else "Being calibrated."}
@@ -86,6 +87,7 @@ def calibration_view(session: Session) -> dict[str, Any] | None:
         "attainable": facts.attainable_rate,
         "alpha": facts.false_alarm_rate,
         "guarantee": facts.guarantee,
+        "note": note,
         "text": _calibration_text(facts, has_strokes=bool(movement.strokes)),
     }
 
