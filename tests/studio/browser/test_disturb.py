@@ -137,6 +137,7 @@ def test_a_via_point_is_added_timed_and_removed(studio: Studio) -> None:
 def test_what_is_traced_is_recognised(studio: Studio) -> None:
     studio.teach("loop", 3)
     studio.teach("line", 3, line)
+    studio.says("#calibration-text", "Calibrated on 6 ")  # together: fewer vouch for too little
     studio.mode("Trace")
     studio.draw(line)
     studio.says("#scores", "Looks like line")
