@@ -1,6 +1,7 @@
 """A page as tests have it: a websocket to a studio that runs in a thread of this process."""
 
 import json
+import socket
 import threading
 import time
 
@@ -16,9 +17,10 @@ PATIENCE = 60
 
 
 class RunningStudio:
-    """A studio on a free port of 127.0.0.1."""
+    """A studio on a free port of 127.0.0.1; `buffered`: bytes that the system keeps of what a page does not read."""
 
-    def __init__(self, token=None, given=None, host="127.0.0.1", port=0):
+    def __init__(self, token=None, given=None, host="127.0.0.1", port=0, buffered=None):
+        self._buffered = buffered
         self.app = studio_app(host, token, given or {})
         self._server = make_server(self.app)
         self._server.config.port = port
@@ -30,7 +32,10 @@ class RunningStudio:
         while not self._server.started:
             assert time.monotonic() - since < PATIENCE
             time.sleep(0.01)
-        self.port = self._server.servers[0].sockets[0].getsockname()[1]
+        listening = self._server.servers[0].sockets[0]
+        if self._buffered is not None:
+            listening.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, self._buffered)
+        self.port = listening.getsockname()[1]
         self.address = f"127.0.0.1:{self.port}"
         return self
 
@@ -38,6 +43,11 @@ class RunningStudio:
         self._server.should_exit = True
         self._thread.join(PATIENCE)
         assert not self._thread.is_alive()
+
+    @property
+    def shared(self):
+        """What the server has in common for all pages, to be looked at."""
+        return self.app.routes[0].endpoint.__self__
 
     def page(self, session=None, **options):
         return Page(self, session, **options)
@@ -78,9 +88,19 @@ class Page:
             if message["type"] in types and where(message):
                 return message
 
-    def ask(self, type, *answers, **fields):
+    def watch(self, count):
+        """The next frames, so many; messages between them are passed over."""
+        since, until = len(self.frames), time.monotonic() + PATIENCE
+        while len(self.frames) < since + count:
+            received = self.socket.recv(timeout=max(until - time.monotonic(), 0))
+            if isinstance(received, bytes):
+                self.frames.append(received)
+        return self.frames[since:]
+
+    def ask(self, type, *answers, where=lambda message: True, **fields):
+        """Says it, and hears the answer; `where` tells it from what was under way already."""
         self.say(type, **fields)
-        return self.hear(*(answers or ("error",)))
+        return self.hear(*(answers or ("error",)), where=where)
 
     def state(self):
         return self.ask("hello", "state")

@@ -11,12 +11,13 @@ from contextlib import suppress
 
 import numpy as np
 import pytest
-from studio_page import RunningStudio
+from studio_page import PATIENCE, RunningStudio
 from websockets.exceptions import InvalidStatus
 
-from probdmp import write_demonstrations
+from probdmp import FailureDetector, ProbabilisticDMP, write_demonstrations
 from probdmp.demonstrations import Demonstration, synthetic_arm_movements
 from probdmp.errors import InputError
+from probdmp.studio.jobs import Contents
 from probdmp.studio.limits import LARGEST_MESSAGE, MOST_LABELS, MOST_POINTS, MOST_SESSIONS, MOST_SOCKETS, MOST_STROKES
 from probdmp.studio.outbox import MOST_WAITING, Outbox
 from probdmp.studio.room import Room
@@ -24,6 +25,8 @@ from probdmp.studio.session import Session
 from probdmp.studio.sessions import Sessions
 from probdmp.studio.workers import Workers
 
+SMALL = 4096
+"""Bytes that a socket is to hold."""
 LINE = [[0.01 * k, k, 2 * k, None] for k in range(30)]
 
 
@@ -196,7 +199,7 @@ def test_there_are_at_most_so_many_sockets(studio):
     finally:
         for page in pages:
             page.socket.close()
-    until = time.monotonic() + 10
+    until = time.monotonic() + PATIENCE
     while time.monotonic() < until:  # places are free again
         try:
             with studio.page() as again:
@@ -334,7 +337,7 @@ def test_a_token_opens_the_door_once_and_a_cookie_afterwards():
 
 def test_what_is_no_http_at_all_is_left_alone(studio, page):
     for garbage in (b"\x16\x03\x01\x02\x00", b"GET\r\n\r\n", b"A" * 100_000, b"GET / HTTP/9.9\r\n\r\n"):
-        with socket.create_connection(("127.0.0.1", studio.port), timeout=5) as raw:
+        with socket.create_connection(("127.0.0.1", studio.port), timeout=PATIENCE) as raw:
             raw.sendall(garbage)
     assert page.state()
 
@@ -366,10 +369,10 @@ def test_a_page_that_never_listens_gets_the_newest_frame_or_is_left():
             outbox.send({"type": "state", "k": k}, "state")
         assert len(outbox._messages) == 1
         blocked.set()
-        await asyncio.sleep(0.01)
+        while len(sent) < 3:
+            await asyncio.sleep(0)
         assert sent[0] == b"first"
         assert sent[-1] == b"99999"
-        assert len(sent) == 3
         blocked.clear()
         for _ in range(MOST_WAITING + 2):
             outbox.send({"type": "error"})
@@ -381,37 +384,95 @@ def test_a_page_that_never_listens_gets_the_newest_frame_or_is_left():
     asyncio.run(flood())
 
 
-def test_a_page_that_never_reads_is_closed(studio, page):
-    with socket.create_connection(("127.0.0.1", studio.port)) as raw:
-        raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-        key = "dGhlIHNhbXBsZSBub25jZQ=="
+def test_a_page_that_does_not_read_for_a_while_gets_the_newest_and_not_all_of_it(drawn):
+    """Over a socket that holds little: nothing piles up behind it."""
+    learned = ProbabilisticDMP().fit(drawn)
+    detector = FailureDetector().fit({"c": learned}, {"c": drawn})
+    given = {"c": Contents([], {"c": learned}, detector)}
+    with (
+        RunningStudio(given=given, buffered=SMALL) as studio,
+        narrow_socket(studio) as raw,
+        studio.page(sock=raw, max_queue=1, ping_interval=None, close_timeout=0.1) as page,
+    ):
+        page.state()
+        page.ask("play", "playing", speed=0.1)
+        page.say("pointer", mode="hold", x=50, y=40)  # so that it lasts
+        first = sequence_of(*page.watch(1))
+        room = studio.shared.sessions.find(page.session)
+        waiting, n_asked = room.session.outbox._messages, 30
+        for _ in range(n_asked):
+            page.say("hello")  # the state and a band of 50 kB
+        page.say("export_commands")
+        assert sampled(lambda: len(waiting), until=lambda: "commands" in waiting) <= 4  # with a verdict
+        behind = room._sequence + 3
+        assert sampled(lambda: len(waiting), until=lambda: room._sequence >= behind) <= 4
+        page.hear("commands")
+        came = [sequence_of(frame) for frame in page.frames]
+        newest = sequence_of(*page.watch(1))
+    assert newest >= behind
+    assert came == sorted(set(came))
+    assert len(came) < behind - first  # the others were left out
+
+
+def test_a_page_that_never_reads_is_given_up(studio, page):
+    n_sockets = studio.shared.n_sockets
+    text = b'{"type":"' + b"x" * 100 + b'"}'
+    with narrow_socket(studio) as raw:
         raw.sendall(
             f"GET /ws HTTP/1.1\r\nHost: {studio.address}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-            f"Sec-WebSocket-Key: {key}\r\nSec-WebSocket-Version: 13\r\n\r\n".encode()
+            "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n\r\n".encode()
         )
-        text = b'{"type":"' + b"x" * 100 + b'"}'
-        frame = bytes([0x81, 0x80 | len(text)]) + bytes(4) + text
-        raw.settimeout(1)
-        with suppress(OSError):  # it is not read any more, or was closed
-            for _ in range(200_000):
-                raw.sendall(frame)
+        sampled(lambda: 0, until=lambda: studio.shared.n_sockets > n_sockets)
+        raw.setblocking(False)
+
+        frames = 1000 * (bytes([0x81, 0x80 | len(text)]) + bytes(4) + text)
+        left = memoryview(frames)
+
+        def is_given_up():
+            nonlocal left
+            with suppress(OSError):  # nobody takes it any more
+                while True:
+                    left = left[raw.send(left) :] or memoryview(frames)
+            return studio.shared.n_sockets == n_sockets
+
+        sampled(lambda: 0, until=is_given_up)
     assert page.state()
 
 
+def narrow_socket(studio):
+    """A connection that takes little before it is read."""
+    raw = socket.create_connection(("127.0.0.1", studio.port))
+    raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, SMALL)
+    return raw
+
+
+def sampled(value, until):
+    """The largest of a value that is looked at again and again until something is so."""
+    largest, end = value(), time.monotonic() + PATIENCE
+    while not until():
+        assert time.monotonic() < end
+        time.sleep(0.002)
+        largest = max(largest, value())
+    return largest
+
+
+def sequence_of(frame):
+    return int.from_bytes(frame[4:8], "little")
+
+
 def test_work_that_takes_too_long_is_ended_and_the_next_goes_on():
-    async def work():
-        workers = Workers(seconds=0.3, warms_up=False)
+    async def work(seconds, endless, arguments, message):
+        workers = Workers(seconds=seconds, warms_up=False)
         workers.start()
         try:
-            with pytest.raises(InputError, match=r"more than 0\.3 s"):
-                await workers.run(time.sleep, 60)
-            with pytest.raises(InputError, match="a process that ended"):
-                await workers.run(os._exit, 3)
+            with pytest.raises(InputError, match=message):
+                await workers.run(endless, *arguments)
             assert await workers.run(abs, -1) == 1
         finally:
             workers.stop()
 
-    asyncio.run(work())
+    asyncio.run(work(1.0, time.sleep, (60,), "more than 1 s"))
+    asyncio.run(work(PATIENCE, os._exit, (3,), "a process that ended"))
 
 
 def test_connecting_without_end_makes_no_session_each():

@@ -1,6 +1,7 @@
 """Message by message: what a page says, and what it is told."""
 
 import io
+import json
 import struct
 import zipfile
 
@@ -10,8 +11,15 @@ from studio_page import RunningStudio, points_of
 
 from probdmp import FailureDetector, PrimitiveLibrary, ProbabilisticDMP, load, read_demonstrations, write_demonstrations
 from probdmp.demonstrations import FAULTS, LETTERS, synthetic_letters
+from probdmp.dmp import task_for
+from probdmp.execution import planned_recording
+from probdmp.plotting.trajectories import band_edges
 from probdmp.studio.jobs import Contents
+from probdmp.studio.limits import DT
 from probdmp.studio.strokes import stroke_of
+
+SHORTENED = 6e-5
+"""Of numbers that a page is told with five digits, the relative error."""
 
 
 def rows_of(frame):
@@ -46,10 +54,12 @@ def test_a_stroke_is_learned_and_comes_back_as_the_librarys_band(page, drawn):
     band = page.hear("band")
     learned, _ = as_taught(drawn[:1])
     planned = learned.rollout()
-    np.testing.assert_allclose(band["times"], planned.times, rtol=1e-12)
-    np.testing.assert_allclose(band["path"]["mean"], planned.positions, rtol=1e-9)
-    np.testing.assert_allclose(band["velocity"]["std"], planned.velocity_stds, rtol=1e-9)
-    np.testing.assert_allclose(band["acceleration"]["mean"], planned.accelerations, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(band["times"], planned.times, rtol=SHORTENED)
+    np.testing.assert_allclose(band["path"]["mean"], planned.positions, rtol=SHORTENED)
+    lower, upper = band_edges(planned.velocities, planned.velocity_stds)
+    np.testing.assert_allclose(band["velocity"]["lower"], lower, rtol=SHORTENED)
+    np.testing.assert_allclose(band["velocity"]["upper"], upper, rtol=SHORTENED)
+    np.testing.assert_allclose(band["acceleration"]["mean"], planned.accelerations, rtol=SHORTENED, atol=1e-9)
     assert band["change"] == ""
     page.say("stroke", label="c", points=points_of(drawn[1]))
     assert page.hear("band")["change"].startswith("the second demonstration moved the mean by")
@@ -59,26 +69,40 @@ def test_an_example_shows_everything_by_one_click(page):
     page.say("example", name="a")
     band = page.hear("band")
     assert band["label"] == "a"
-    assert {"phase", "mean", "std"} <= set(band["forcing"])
+    assert {"phase", "mean", "lower", "upper"} == set(band["forcing"])
     assert all(len(ellipse) == 5 for ellipse in band["tube"])
     assert np.min(band["path"]["mean"]) >= 0
     assert np.max(band["path"]["mean"]) <= 100
-    state = page.hear("state", where=lambda state: state["calibration"]["n"])
+    state = page.hear("state", where=lambda state: state["calibration"] and state["calibration"]["n"])
     assert state["calibration"]["n"] == 10
-    assert state["calibration"]["attainable"] == pytest.approx(1 / 11)
+    assert state["calibration"]["attainable"] == pytest.approx(1 / 11, rel=SHORTENED)
     assert len(state["labels"][0]["strokes"]) == 10
 
 
 def test_labels_are_added_renamed_selected_deleted(page, drawn):
-    page.ask("add_label", "state", label="<b>one</b>")
-    page.ask("stroke", "state", label="two", points=points_of(drawn[0]))
+    def becomes(selected, **strokes):
+        """What the state says in the end; others may be under way."""
+        known = {name.replace("one", "<b>one</b>"): count for name, count in strokes.items()}
+        page.hear(
+            "state",
+            where=lambda state: (
+                state["selected"] == selected and {one["name"]: len(one["strokes"]) for one in state["labels"]} == known
+            ),
+        )
+
+    page.say("add_label", label="<b>one</b>")
+    page.say("stroke", label="two", points=points_of(drawn[0]))
+    becomes("two", one=0, two=1)
     page.hear("band")
-    assert page.ask("select", "state", label="<b>one</b>")["selected"] == "<b>one</b>"
-    assert [known["name"] for known in page.ask("rename_label", "state", label="two", to="three")["labels"]][1] == "three"
-    page.hear("band")
-    state = page.ask("delete_stroke", "state", label="three", index=0)
-    assert state["labels"][1]["strokes"] == []
-    assert [known["name"] for known in page.ask("delete_label", "state", label="three")["labels"]] == ["<b>one</b>"]
+    page.say("select", label="<b>one</b>")
+    becomes("<b>one</b>", one=0, two=1)
+    page.say("rename_label", label="two", to="three")
+    becomes("<b>one</b>", one=0, three=1)
+    assert page.hear("band")["label"] == "three"
+    page.say("delete_stroke", label="three", index=0)
+    becomes("<b>one</b>", one=0, three=0)
+    page.say("delete_label", label="three")
+    becomes("<b>one</b>", one=0)
 
 
 def test_settings_change_what_is_learned(taught, drawn):
@@ -87,13 +111,12 @@ def test_settings_change_what_is_learned(taught, drawn):
     band = taught.hear("band")
     strokes = as_taught(drawn)[1]
     published = ProbabilisticDMP.as_published(12).fit(strokes).rollout()
-    np.testing.assert_allclose(band["path"]["mean"], published.positions, rtol=1e-8)
+    np.testing.assert_allclose(band["path"]["mean"], published.positions, rtol=SHORTENED)
 
 
 def test_alpha_alone_calibrates_without_learning(taught):
     taught.ask("settings", "state", alpha=0.2)
-    state = taught.hear("state", where=lambda state: state["calibration"]["n"])
-    assert state["calibration"]["alpha"] == 0.2
+    taught.hear("state", where=lambda state: state["calibration"]["alpha"] == 0.2)
 
 
 def test_a_task_bends_the_path(taught):
@@ -110,25 +133,29 @@ def test_a_task_bends_the_path(taught):
     assert "not watched" not in verdict["text"]
 
 
-def test_playing_is_undisturbed_and_what_is_shown_is_what_the_library_says(taught, drawn):
-    playing = taught.ask("play", "playing", speed=0.6)  # hence at most one tick in a frame
+def test_playing_is_undisturbed_and_what_is_shown_is_what_the_library_says(taught, drawn, monkeypatch):
+    monkeypatch.setattr("probdmp.studio.room.secrets.randbits", lambda bits: 7)
+    playing = taught.ask("play", "playing", speed=0.6)
     assert playing["names"] == ["x", "y"]
     assert playing["threshold"] == 1.0
     assert taught.hear("played")["completed"]
+    learned, strokes = as_taught(drawn)
+    execution = learned.execute(detector=FailureDetector(0.01).fit({"c": learned}, {"c": strokes}))
+    primitive = learned.primitive_
+    read = planned_recording(primitive, task_for(primitive), DT, np.random.default_rng(7)).positions
+    ticks = [(step.time, step.position.copy(), step.contributions.copy()) for step in map(execution.step, read)]
     shown = [rows_of(frame) for frame in taught.frames]
-    assert {head["kind"] for head, _ in shown} == {1}
-    assert not any(head["flags"] & 1 for head, _ in shown)
+    assert shown
     sequence = [head["sequence"] for head, _ in shown]
     assert sequence == sorted(set(sequence))
-    learned, strokes = as_taught(drawn)
-    detector = FailureDetector(0.01).fit({"c": learned}, {"c": strokes})
-    execution = learned.execute(detector=detector)
-    if sequence[-1] - sequence[0] + 1 == len(sequence) and len(shown) >= 0.99 * playing["duration"] / 0.01:
-        for head, rows in shown:  # none was dropped: the same readings, in float32, step by step
-            step = execution.step(rows[0].astype(float))
-            np.testing.assert_allclose(rows[1], step.position, rtol=1e-4)
-            np.testing.assert_allclose(rows[3], step.contributions, atol=0.02)
-            assert head["time"] == pytest.approx(step.time, abs=1e-5)
+    for head, rows in shown:  # all that came, however many were left out
+        k = round((head["time"] - ticks[0][0]) / DT)
+        time, position, contributions = ticks[k]
+        assert (head["kind"], head["flags"] & 1) == (1, 0)
+        assert head["time"] == pytest.approx(time, abs=1e-5)
+        np.testing.assert_allclose(rows[0], read[k], rtol=1e-5)
+        np.testing.assert_allclose(rows[1], position, rtol=1e-5)
+        np.testing.assert_allclose(rows[3], contributions, atol=1e-3)
 
 
 def test_a_fault_is_caught_and_explained(taught):
@@ -145,11 +172,7 @@ def test_a_fault_is_caught_and_explained(taught):
 
 def test_a_held_pen_is_caught(taught):
     taught.ask("play", "playing", speed=0.5)
-    while len(taught.frames) < 20:
-        frame = taught.socket.recv(timeout=5)
-        assert isinstance(frame, bytes)
-        taught.frames.append(frame)
-    x, y = rows_of(taught.frames[-1])[1][0].tolist()
+    x, y = rows_of(taught.watch(20)[-1])[1][0].tolist()
     taught.say("pointer", mode="hold", x=x, y=y)
     verdict = taught.hear("verdict")
     assert verdict["failed"]
@@ -185,12 +208,14 @@ def test_a_replay_is_what_the_detector_says(taught, drawn):
     replayed = taught.ask("replay", "replayed", "error", label="c", index=3)
     learned, strokes = as_taught(drawn)
     (verdict,) = FailureDetector(0.01).fit({"c": learned}, {"c": strokes}).verdicts([strokes[3]])
-    assert replayed["verdict"]["test_ratio"] == pytest.approx(verdict.test_ratio, rel=1e-9)
+    assert replayed["verdict"]["test_ratio"] == pytest.approx(verdict.test_ratio, rel=SHORTENED)
     assert replayed["verdict"]["text"] == str(verdict)
     assert len(replayed["times"]) == len(replayed["test_ratios"]) == strokes[3].n_samples
     compared = taught.ask("compare", "compared", "error", label="c", index=3)
-    np.testing.assert_allclose(compared["smoothed"]["mean"], learned.smooth(strokes[3]).positions, rtol=1e-8)
-    np.testing.assert_allclose(compared["filtered"]["std"], learned.track(strokes[3]).position_stds, rtol=1e-6)
+    np.testing.assert_allclose(compared["smoothed"]["mean"], learned.smooth(strokes[3]).positions, rtol=SHORTENED)
+    tracked = learned.track(strokes[3])
+    _, upper = band_edges(tracked.positions, tracked.position_stds)
+    np.testing.assert_allclose(compared["filtered"]["upper"], upper, rtol=SHORTENED)
 
 
 def test_commands_do_the_same_again(taught, tmp_path, monkeypatch):
@@ -201,7 +226,9 @@ def test_commands_do_the_same_again(taught, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names = {}
     exec(commands["python"], names)  # what the page lets one copy
-    np.testing.assert_allclose(names["planned"].positions, taught.ask("task", "band", start=None)["path"]["mean"], rtol=1e-6)
+    np.testing.assert_allclose(
+        names["planned"].positions, taught.ask("task", "band", start=None)["path"]["mean"], rtol=SHORTENED
+    )
 
 
 def test_downloads_hold_what_was_taught(taught, drawn, tmp_path):
@@ -258,6 +285,29 @@ def test_pressure_is_learned_with_the_movement(page, drawn):
     np.testing.assert_allclose(band["channels"]["pressure"]["mean"], 0.5, atol=0.01)
     assert page.ask("play", "playing", "error", speed=4)["names"] == ["x", "y", "pressure"]
     page.hear("played")
+
+
+def test_what_is_shown_of_a_stroke_teaches_it_again(studio, page, drawn):
+    page.say("stroke", label="c", points=points_of(drawn[0], pressure=0.5))
+    ((shown,),) = [one["strokes"] for one in page.hear("state")["labels"]]
+    with studio.page() as other:
+        other.ask("stroke", "band", label="c", points=shown["points"])
+        with studio.http() as http:
+            bodies = [http.get(f"/download/{one.session}/demonstrations.csv").text for one in (page, other)]
+    first, second = (np.genfromtxt(io.StringIO(body), delimiter=",", names=True) for body in bodies)
+    assert "pressure" in first.dtype.names
+    for name in ("x", "y", "pressure"):
+        np.testing.assert_allclose(second[name], first[name], rtol=SHORTENED)
+
+
+def test_messages_are_no_longer_than_a_picture_needs(page):
+    page.say("example", name="a")
+    longest = {"state": 0, "band": 0}
+    while not (longest["band"] and longest["state"]):
+        message = page.hear("state", "band")
+        longest[message["type"]] = len(json.dumps(message, separators=(",", ":")))
+    assert longest["band"] < 60_000
+    assert longest["state"] < 40_000
 
 
 def test_two_sessions_do_not_see_each_other(studio, page, drawn):

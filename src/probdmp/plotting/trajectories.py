@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "QUANTITIES",
+    "band_edges",
     "band_panels",
     "ellipses",
     "evenly_spaced",
@@ -108,6 +109,11 @@ def tube_ellipses(centers: FloatArray, covariances: FloatArray, n_stds: float = 
     eigenvalues, vectors = np.linalg.eigh(covariances)
     half_axes = n_stds * np.sqrt(np.maximum(eigenvalues, 0.0))
     return np.column_stack([centers, half_axes, np.arctan2(vectors[:, 1, 0], vectors[:, 0, 0])])
+
+
+def band_edges(means: FloatArray, stds: FloatArray, n_stds: float = TUBE_STDS) -> tuple[FloatArray, FloatArray]:
+    """Lower and upper edge of a band of n_stds standard deviations on either side; arrays of the same shape and unit each."""
+    return means - n_stds * stds, means + n_stds * stds
 
 
 def band_panels(rollout: GaussianTrajectory, dofs: Sequence[int]) -> list[Panel]:

@@ -11,12 +11,12 @@ from probdmp.dmp.phase import phases_at
 from probdmp.estimator import ProbabilisticDMP
 from probdmp.execution import movement_change, position_covariances, roll_out, via_points_for
 from probdmp.io.plain_values import plain
-from probdmp.plotting.trajectories import QUANTITIES, evenly_spaced, tube_ellipses
+from probdmp.plotting.trajectories import QUANTITIES, band_edges, evenly_spaced, tube_ellipses
 from probdmp.studio.limits import DT
 from probdmp.studio.session import Movement, TaskWish
 from probdmp.studio.views import task_view
 
-__all__ = ["asked_of", "band_view"]
+__all__ = ["asked_of", "band_of", "band_view"]
 
 MOST_TIMES = 200
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
@@ -39,10 +39,10 @@ def band_view(label: str, movement: Movement, wish: TaskWish) -> dict[str, Any]:
     chosen = evenly_spaced(len(planned.times), MOST_TIMES)
     tube = tube_ellipses(planned.positions[chosen], position_covariances(primitive, task, DT)[chosen])
     bands: dict[str, Any] = {
-        "path" if quantity == "position" else quantity: _band(getattr(planned, means)[chosen], getattr(planned, stds)[chosen])
+        "path" if quantity == "position" else quantity: band_of(getattr(planned, means)[chosen], getattr(planned, stds)[chosen])
         for quantity, (means, stds, _) in QUANTITIES.items()
     }
-    channels = {name: _band(channel.means[chosen], channel.stds[chosen]) for name, channel in planned.channels.items()}
+    channels = {name: band_of(channel.means[chosen], channel.stds[chosen]) for name, channel in planned.channels.items()}
     phases = phases_at(planned.times[chosen], float(task.duration))
     forcing = forcing_term(primitive, phases)
     return plain(
@@ -52,7 +52,7 @@ def band_view(label: str, movement: Movement, wish: TaskWish) -> dict[str, Any]:
             "times": planned.times[chosen],
             **bands,
             "channels": channels,
-            "forcing": {"phase": phases, **_band(forcing.means, np.sqrt(forcing.variances))},
+            "forcing": {"phase": phases, **band_of(forcing.means, np.sqrt(forcing.variances))},
             "tube": tube,
             "change": _change_text(movement),
             "task": task_view(wish),
@@ -61,8 +61,10 @@ def band_view(label: str, movement: Movement, wish: TaskWish) -> dict[str, Any]:
     )
 
 
-def _band(means: FloatArray, stds: FloatArray) -> dict[str, Any]:
-    return {"mean": means, "std": stds}
+def band_of(means: FloatArray, stds: FloatArray) -> dict[str, FloatArray]:
+    """A mean and the edges of its band, arrays of one shape, as they are drawn."""
+    lower, upper = band_edges(means, stds)
+    return {"mean": means, "lower": lower, "upper": upper}
 
 
 def _change_text(movement: Movement) -> str:

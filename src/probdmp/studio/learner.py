@@ -1,6 +1,7 @@
 """Learning as strokes come in: in a worker, the newest stroke first, older results ignored."""
 
 import asyncio
+import math
 import time
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
@@ -10,9 +11,14 @@ from probdmp.detection import FailureDetector
 from probdmp.errors import ProbDMPError
 from probdmp.studio import jobs, views
 from probdmp.studio.session import Session
-from probdmp.studio.workers import Workers
+from probdmp.studio.workers import TooLongError, Workers
 
 __all__ = ["Learner"]
+
+EACH_BY_ITSELF = (
+    "There are too many strokes to compare all letters in time: each letter is watched by itself, and an alarm does not say "
+    "which other one fits better. With fewer letters, or fewer strokes of each, it does."
+)
 
 
 class Learner:
@@ -30,6 +36,8 @@ class Learner:
         self._news = asyncio.Event()
         self._learning: asyncio.Task[None] | None = None
         self._calibrating: asyncio.Task[None] | None = None
+        self._too_many: float = math.inf
+        """Demonstrations that took too long to calibrate together."""
 
     def learn(self, *labels: str) -> None:
         """Learn labels anew, as soon as may be; the last one first."""
@@ -127,13 +135,40 @@ class Learner:
                 session.detectors = {**session.detectors, **found} | await self._calibrated(*alone)
                 self._news.set()
             if not self._is_stale and library:
-                found |= await self._calibrated(library, strokes)
+                found |= await self._all_calibrated(library, strokes)
             kept = {label: d for label, d in session.detectors.items() if label in session.movements}
             session.detectors, session.calibration_problem = kept | found, ""
             self._news.set()
         except ProbDMPError as error:
             session.calibration_problem = str(error)
         session.send(views.state_view(session), "state")
+
+    async def _all_calibrated(self, library: dict[str, Any], strokes: dict[str, Any]) -> dict[str, FailureDetector]:
+        """Together; or each by itself, those that have changed, where that took too long before."""
+        count = sum(map(len, strokes.values()))
+        if count < self._too_many:
+            try:
+                together = await self._calibrated(library, strokes)
+            except TooLongError:
+                if len(library) == 1:
+                    raise
+                self._too_many = count
+            else:
+                self._session.calibration_note = ""
+                return together
+        self._session.calibration_note = EACH_BY_ITSELF
+        return await self._each_calibrated(library, strokes)
+
+    async def _each_calibrated(self, library: dict[str, Any], strokes: dict[str, Any]) -> dict[str, FailureDetector]:
+        session, found = self._session, {}
+        for label, learned in library.items():
+            known = session.detectors.get(label)
+            own = [] if known is None else [p.identity for p in known.primitives_.values()]
+            if known is not None and own == [learned.primitive_.identity] and known.false_alarm_rate == session.settings.alpha:
+                found[label] = known
+            elif not self._is_stale:  # else all begins anew
+                found |= await self._calibrated({label: learned}, {label: strokes[label]})
+        return found
 
     async def _calibrated(self, library: dict[str, Any], strokes: dict[str, Any]) -> dict[str, FailureDetector]:
         return await self._workers.run_long(jobs.calibrate, library, strokes, self._session.settings.alpha)

@@ -1,9 +1,10 @@
 """What waits to be sent to one page, bounded whatever the page does."""
 
 import asyncio
-import json
 from collections.abc import Awaitable, Callable
 from typing import Any
+
+from probdmp.studio.messages import text_of
 
 __all__ = ["MOST_WAITING", "POLICY", "Outbox"]
 
@@ -30,7 +31,7 @@ class Outbox:
         """Queue a message; one with the same key that still waits is replaced."""
         if self.ended.is_set():
             return
-        text = json.dumps(message, allow_nan=False)  # now: what it speaks of may change
+        text = text_of(message)  # now: what it speaks of may change
         self._n_sent += 1
         name: object = self._n_sent if key is None else key
         self._messages.pop(name, None)

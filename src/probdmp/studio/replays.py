@@ -7,6 +7,7 @@ from probdmp.evaluation import JudgedExecution
 from probdmp.execution import GaussianTrajectory, TrackedTrajectory
 from probdmp.io.plain_values import plain
 from probdmp.plotting.trajectories import evenly_spaced
+from probdmp.studio.bands import band_of
 from probdmp.studio.views import verdict_view
 
 __all__ = ["compared_view", "replayed_view"]
@@ -40,7 +41,7 @@ def compared_view(
     """An execution as recorded, as filtered, and in hindsight."""
     chosen = evenly_spaced(recording.n_samples, MOST_TIMES)
     bands = {
-        name: {"mean": band.positions[chosen], "std": band.position_stds[chosen]}
+        name: band_of(band.positions[chosen], band.position_stds[chosen])
         for name, band in (("filtered", tracked), ("smoothed", smoothed))
     }
     recorded = {"label": label, "times": recording.times[chosen], "recorded": recording.positions[chosen]}

@@ -69,6 +69,8 @@ class Session:
         self.detectors: dict[str, FailureDetector] = {}
         self.calibration_problem = ""
         """Why there are no detectors, if calibrating failed."""
+        self.calibration_note = ""
+        """What detectors cannot do that they usually can, and what helps."""
         self.outbox: Outbox | None = None
         """Of the page, while it is connected."""
 

@@ -2,6 +2,8 @@
 
 from typing import Any
 
+import numpy as np
+
 from probdmp import __version__
 from probdmp.demonstrations import FAULTS, Demonstration
 from probdmp.detection import Verdict
@@ -13,7 +15,7 @@ from probdmp.plotting.trajectories import evenly_spaced
 from probdmp.studio.commands import commands_of
 from probdmp.studio.limits import SIMULATED
 from probdmp.studio.session import Session, TaskWish
-from probdmp.studio.settings import CHOICES
+from probdmp.studio.settings import CHOICES, PRESSURE
 from probdmp.studio.strokes import EXAMPLES
 
 __all__ = ["calibration_view", "error_view", "state_view", "stroke_view", "task_view", "verdict_view"]
@@ -52,10 +54,11 @@ def state_view(session: Session) -> dict[str, Any]:
 
 
 def stroke_view(stroke: Demonstration) -> dict[str, Any]:
-    """A demonstration as it is shown small beside the canvas."""
+    """A demonstration as it is shown small beside the canvas, and taught again: seconds, x, y and, if it was felt, pressure."""
     chosen = evenly_spaced(stroke.n_samples, MOST_SHOWN)
-    points = [[t, *row] for t, row in zip(stroke.times[chosen].tolist(), stroke.positions[chosen].tolist(), strict=True)]
-    return {"points": points, "duration": stroke.duration}
+    felt = [stroke.channels[PRESSURE]] if PRESSURE in stroke.channels else []
+    points = np.column_stack([stroke.times, stroke.positions, *felt])[chosen]
+    return {"points": points.tolist(), "duration": stroke.duration}
 
 
 def task_view(wish: TaskWish) -> dict[str, Any]:
@@ -70,7 +73,8 @@ def calibration_view(session: Session) -> dict[str, Any] | None:
     if movement is None or movement.learned is None:
         return None
     detector, identity = session.detectors.get(session.selected or ""), movement.learned.primitive_.identity
-    unknown = {"n": 0, "attainable": None, "alpha": session.settings.alpha, "guarantee": "none"}
+    note = session.calibration_note
+    unknown = {"n": 0, "attainable": None, "alpha": session.settings.alpha, "guarantee": "none", "note": note}
     if detector is None or identity not in {p.identity for p in detector.primitives_.values()}:
         why = session.calibration_problem
         return unknown | {"text": f"Not calibrated. {why}" if why else "Being calibrated."}
@@ -83,6 +87,7 @@ def calibration_view(session: Session) -> dict[str, Any] | None:
         "attainable": facts.attainable_rate,
         "alpha": facts.false_alarm_rate,
         "guarantee": facts.guarantee,
+        "note": note,
         "text": _calibration_text(facts, has_strokes=bool(movement.strokes)),
     }
 

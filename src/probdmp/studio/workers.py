@@ -13,9 +13,13 @@ from probdmp.errors import InputError
 from probdmp.fleet.work import one_thread_each
 from probdmp.studio.limits import JOB_SECONDS
 
-__all__ = ["Workers"]
+__all__ = ["TooLongError", "Workers"]
 
 Result = TypeVar("Result")
+
+
+class TooLongError(InputError):
+    """Work that was ended because it took longer than it may."""
 
 
 def _prepare(warms_up: bool) -> None:
@@ -76,8 +80,10 @@ class Workers:
 
         Raises
         ------
+        TooLongError
+            If it takes longer than allowed.
         InputError
-            If it takes longer than allowed, or its process dies.
+            If its process dies.
         """
         return await self._quick.run(work, arguments)
 
@@ -109,10 +115,13 @@ class _Post:
                 return await self._worker.run(work, arguments, self._seconds)
             except (TimeoutError, BrokenProcessPool) as error:
                 self._replace()
-                late = isinstance(error, TimeoutError)
-                got = f"more than {self._seconds:g} s" if late else "a process that ended, perhaps for lack of memory"
-                hint = "Fewer or shorter strokes, or fewer basis functions, take less."
-                raise InputError(f"work of at most {self._seconds:g} s", got, hint) from error
+                wanted, hint = (
+                    f"work of at most {self._seconds:g} s",
+                    "Fewer or shorter strokes, or fewer basis functions, take less.",
+                )
+                if isinstance(error, TimeoutError):
+                    raise TooLongError(wanted, f"more than {self._seconds:g} s", hint) from error
+                raise InputError(wanted, "a process that ended, perhaps for lack of memory", hint) from error
             except asyncio.CancelledError:
                 self._replace()  # it would go on for nobody
                 raise

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from studio_browser import Studio
+from studio_browser import Studio, new_page
 
 CHROMIUMS = ("chromium", "chromium-browser", "google-chrome")
 INSTALL = "sudo apt-get install chromium, or playwright install chromium, or set PROBDMP_CHROMIUM to the path of one"
@@ -90,9 +90,9 @@ def open_studio(browser: Any) -> Iterator[Callable[..., Studio]]:
     opened: list[Studio] = []
 
     def open_page(server: Server, **context: Any) -> Studio:
-        size = {"viewport": {"width": 1440, "height": 900}, "reduced_motion": "reduce"}
-        studio = Studio(browser.new_context(**(size | context)).new_page(), server.url)
+        studio = new_page(browser, **context)
         opened.append(studio)
+        studio.open(server.url)
         return studio
 
     yield open_page
@@ -102,7 +102,19 @@ def open_studio(browser: Any) -> Iterator[Callable[..., Studio]]:
     assert not complaints
 
 
+@pytest.fixture(scope="session")
+def kept(browser: Any, server: Server) -> Iterator[Studio]:
+    """A page that many tests open anew, for starting one takes a second."""
+    studio = new_page(browser)
+    studio.open(server.url)
+    yield studio
+    studio.page.context.close()
+
+
 @pytest.fixture
-def studio(open_studio: Callable[..., Studio], server: Server) -> Studio:
-    """The page of a new session."""
-    return open_studio(server)
+def studio(kept: Studio, server: Server) -> Iterator[Studio]:
+    """The page of a new session, in which nothing may go wrong."""
+    kept.forget()
+    kept.open(server.url)
+    yield kept
+    assert not kept.complaints

@@ -1,10 +1,11 @@
 """For eyes, hands and screens of every kind; and nothing from elsewhere."""
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
-from studio_browser import Studio
+from studio_browser import PACE, Studio, new_page
 
 NAMELESS = """() => [...document.querySelectorAll(
     'button, a[href], input, select, [role=tab], [role=tabpanel], dialog, canvas[role]')].filter((one) => {
@@ -34,55 +35,63 @@ CONTRAST = """() => {
   }).filter(([ratio]) => ratio < 4.5);
 }"""
 SCREENS = [(1440, 900), (1024, 768), (390, 844)]
+MODES = ("Teach", "Play", "Trace", "Replay")
 
 
-def test_every_control_has_a_name(studio: Studio) -> None:
+@pytest.fixture(scope="module")
+def shown(browser: Any, server: Any) -> Iterator[Studio]:
+    """A page with an example, to be looked at."""
+    studio = new_page(browser)
+    studio.open(server.url)
     studio.use_example()
-    for mode in ("Teach", "Play", "Trace", "Replay"):
-        studio.mode(mode)
-        assert studio.page.evaluate(NAMELESS) == []
+    yield studio
+    studio.page.context.close()
+    assert not studio.complaints
+
+
+def test_every_control_has_a_name(shown: Studio) -> None:
+    for mode in MODES:
+        shown.mode(mode)
+        shown.becomes(NAMELESS, [])
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_text_stands_out(open_studio: Callable[..., Studio], server: Any, scheme: str) -> None:
-    studio = open_studio(server, color_scheme=scheme)
-    studio.use_example()
-    for mode in ("Play", "Trace", "Replay", "Teach"):
-        studio.mode(mode)
-        assert studio.page.evaluate(CONTRAST) == []
+def test_text_stands_out(shown: Studio, scheme: str) -> None:
+    shown.page.emulate_media(color_scheme=scheme)
+    for mode in MODES:
+        shown.mode(mode)
+        shown.becomes(CONTRAST, [])
 
 
 @pytest.mark.parametrize(("width", "height"), SCREENS)
-def test_it_fits_the_screen(open_studio: Callable[..., Studio], server: Any, width: int, height: int) -> None:
-    studio = open_studio(server, viewport={"width": width, "height": height})
-    studio.use_example()
-    for mode in ("Teach", "Play", "Trace", "Replay"):
-        studio.mode(mode)
-        assert studio.page.evaluate("document.documentElement.scrollWidth") <= width
-        canvas = studio.page.locator("#board").bounding_box()
-        assert canvas["y"] + canvas["height"] <= height
+def test_it_fits_the_screen(shown: Studio, width: int, height: int) -> None:
+    shown.page.set_viewport_size({"width": width, "height": height})
+    shown.becomes("[innerWidth, innerHeight]", [width, height])
+    for mode in MODES:
+        shown.mode(mode)
+        shown.until("document.documentElement.scrollWidth <= innerWidth")
+        shown.until("document.getElementById('board').getBoundingClientRect().bottom <= innerHeight")
 
 
 def test_a_finger_draws_and_its_pressure_is_learned(open_studio: Callable[..., Studio], server: Any) -> None:
     studio = open_studio(server, viewport={"width": 390, "height": 844}, has_touch=True)
     box = studio.page.locator("#ink").bounding_box()
-    devtools = studio.page.context.new_cdp_session(studio.page)
 
-    def touch(kind: str, *at: float) -> None:
+    def touch(kind: str, seconds: float, *at: float) -> None:
         points = [{"x": box["x"] + at[0], "y": box["y"] + at[1], "force": 0.3 + at[0] / 1000}] if at else []
-        devtools.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+        studio.devtools.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points, "timestamp": seconds})
 
     for n in range(2):
-        touch("touchStart", 80, 60)
-        for k in range(30):
-            touch("touchMove", 80 + 5 * k, 60 + (4 - n) * k)
-            studio.page.wait_for_timeout(8)
-        touch("touchEnd")
-        studio.until(f"document.querySelectorAll('#strokes li').length === {n + 1}")
+        begin = time.time() - 30 * PACE
+        touch("touchStart", begin, 80, 60)
+        for k in range(1, 30):
+            touch("touchMove", begin + PACE * k, 80 + 5 * k, 60 + (4 - n) * k)
+        touch("touchEnd", begin + PACE * 30)
+        studio.counts("#strokes li", n + 1)
     studio.page.click("#open-model")
     studio.page.check("#use_pressure")
     studio.page.keyboard.press("Escape")
-    studio.page.wait_for_selector("#charts figcaption:has-text('pressure over time')")
+    studio.says("#charts figcaption", "pressure over time")
 
 
 def test_what_happens_is_said_to_those_who_do_not_see_it(studio: Studio) -> None:

@@ -23,17 +23,18 @@ const LINES = [
 let charts = [];
 let shownTab = null;
 
-const column = (rows, d) => rows.map((row) => row[d]);
+/** As many lines as LINES, of one degree of freedom, or of a channel that has but one. */
+const lines = ({ lower, upper, mean }, d = 0) => [lower, upper, mean].map((rows) => rows.map((row) => [row].flat()[d]));
 
-/** What the tab shows: a title, horizontal values, means and stds of each chart. */
+/** What the tab shows: a title, and horizontal values with the lines over them, of each chart. */
 function panels(shown) {
   const of = tab === "position" ? shown.path : shown[tab];
   const across = tab === "forcing" ? of.phase : shown.times;
   const order = across[0] > across.at(-1) ? (values) => [...values].reverse() : (values) => values; // a phase that decays
-  const axes = of.mean[0].map((_, d) => [TITLES[tab](AXES[d]), column(of.mean, d), column(of.std, d)]);
+  const axes = of.mean[0].map((_, d) => [TITLES[tab](AXES[d]), lines(of, d)]);
   const felt = tab === "position" ? Object.entries(shown.channels ?? {}) : [];
-  const channels = felt.map(([name, { mean, std }]) => [`${name} over time [s]`, mean.flat(), std.flat()]);
-  return [...axes, ...channels].map(([title, mean, std]) => ({ title, across: order(across), mean: order(mean), std: order(std) }));
+  const channels = felt.map(([name, one]) => [`${name} over time [s]`, lines(one)]);
+  return [...axes, ...channels].map(([title, drawn]) => ({ title, data: [across, ...drawn].map(order) }));
 }
 
 function clear() {
@@ -63,10 +64,7 @@ function draw() {
     byId("charts").replaceChildren();
     charts = wanted.map(({ title }) => makeChart(byId("charts"), { title, series: LINES, between: [2, 1] }));
   }
-  wanted.forEach(({ across, mean, std }, k) => {
-    const edge = (side) => mean.map((value, i) => value + 2 * side * std[i]);
-    charts[k].set([across, edge(-1), edge(1), mean]);
-  });
+  wanted.forEach(({ data }, k) => charts[k].set(data));
 }
 
 export function startBands() {

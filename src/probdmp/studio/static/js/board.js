@@ -29,8 +29,9 @@ export function show(changes) {
 function drawPen(context, scale, frame) {
   const tone = colour(frame.failed ? "--alarm" : "--accent");
   const [x, y] = toPixels(frame.desired, scale);
+  const [right, top] = toPixels(frame.upper, scale);
   context.beginPath();
-  context.ellipse(x, y, Math.max(2, 2 * frame.std[0] * scale), Math.max(2, 2 * frame.std[1] * scale), 0, 0, 2 * Math.PI);
+  context.ellipse(x, y, Math.max(2, right - x), Math.max(2, y - top), 0, 0, 2 * Math.PI);
   context.fillStyle = colour("--tube");
   context.fill();
   context.strokeStyle = tone;

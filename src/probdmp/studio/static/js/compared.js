@@ -12,12 +12,11 @@ const LINES = [
 
 /** A chart for each degree of freedom, in `place`. */
 export function makeCompared(place, { times, recorded, filtered, smoothed }) {
-  const edge = (d, side) => smoothed.mean.map((row, k) => row[d] + 2 * side * smoothed.std[k][d]);
   return recorded[0].map((_, d) => {
     const title = `${"xy"[d] ?? d + 1}: recorded (dotted), filtered (dashed), smoothed with its band; over time [s]`;
     const chart = makeChart(place, { title, series: LINES, between: [2, 1], height: 170 });
-    const column = (rows) => rows.map((row) => row[d]);
-    chart.set([times, edge(d, -1), edge(d, 1), column(smoothed.mean), column(filtered.mean), column(recorded)]);
+    const lines = [smoothed.lower, smoothed.upper, smoothed.mean, filtered.mean, recorded];
+    chart.set([times, ...lines.map((rows) => rows.map((row) => row[d]))]);
     return chart;
   });
 }

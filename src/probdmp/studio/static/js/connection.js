@@ -2,6 +2,7 @@
 
 import { emit, on } from "./bus.js";
 import { byId, setText } from "./dom.js";
+import { again } from "./ink.js";
 import { connect, send } from "./socket.js";
 
 let before = null; // the last state of the session that this page showed
@@ -17,7 +18,7 @@ function show(text, action, act) {
 
 function teachAgain(state) {
   for (const { name, strokes } of state.labels) {
-    for (const { points } of strokes) send("stroke", { label: name, points: points.map(([t, x, y]) => [t, x, y, null]) });
+    for (const { points } of strokes) send("stroke", { label: name, points: again(points) });
   }
   if (state.selected) send("select", { label: state.selected });
 }
@@ -34,7 +35,7 @@ export function startConnection() {
     const lost = before?.labels.reduce((sum, one) => sum + one.strokes.length, 0) ?? 0;
     if (before && before.session !== state.session && lost && !state.labels.some((one) => one.strokes.length)) {
       const strokes = before;
-      emit("toast", { text: `The server was started again; your ${lost} strokes were taught to it again.` });
+      emit("toast", { text: `The server was started again; your ${lost} strokes were taught to it again.`, stays: true });
       before = state;
       teachAgain(strokes);
       return;

@@ -19,7 +19,7 @@ export function decodeFrame(buffer) {
     testRatio: view.getFloat32(20, true),
     measured: array(0),
     desired: array(1),
-    std: array(2),
+    upper: array(2),
     contributions: array(3),
   };
 }

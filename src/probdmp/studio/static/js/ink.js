@@ -21,6 +21,9 @@ export function felt(points) {
   return points.some((point) => point[3] !== points[0][3]) ? points : points.map(([t, x, y]) => [t, x, y, null]);
 }
 
+/** A stroke that the server has shown, as it is sent to be taught again. */
+export const again = (points) => points.map(([t, x, y, pressure = null]) => [t, x, y, pressure]);
+
 /**
  * Follows one pointer at a time on `surface`: begin(points, event), then move(new points, event), then end(all points, event).
  * Points are (seconds from the first, x, y, pressure or null). `begin` may return false to leave the pointer alone.

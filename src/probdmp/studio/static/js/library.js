@@ -2,6 +2,7 @@
 
 import { emit, on } from "./bus.js";
 import { byId, make, setChoices, setText, thumbnail } from "./dom.js";
+import { again } from "./ink.js";
 import { selected, session, strokesOf } from "./session.js";
 import { send } from "./socket.js";
 
@@ -44,20 +45,18 @@ function labelRow({ name, strokes, learned }) {
   return row;
 }
 
-const sent = (points) => points.map(([t, x, y]) => [t, x, y, null]);
-
 function deleteLabel(name) {
   const strokes = strokesOf(name);
   send("delete_label", { label: name });
   if (!strokes.length) return;
-  const undo = () => strokes.forEach(({ points }) => send("stroke", { label: name, points: sent(points) }));
+  const undo = () => strokes.forEach(({ points }) => send("stroke", { label: name, points: again(points) }));
   emit("toast", { text: `${name} is deleted.`, action: "Undo", act: undo });
 }
 
 function deleteStroke(label, index) {
   const { points } = strokesOf(label)[index];
   send("delete_stroke", { label, index });
-  const undo = () => send("stroke", { label, points: sent(points) });
+  const undo = () => send("stroke", { label, points: again(points) });
   emit("toast", { text: `Stroke ${index + 1} of ${label} is deleted.`, action: "Undo", act: undo });
 }
 

@@ -2,6 +2,7 @@
 
 import { startBands } from "./bands.js";
 import { startBoard } from "./board.js";
+import { on } from "./bus.js";
 import { startCommands } from "./commands.js";
 import { startConnection } from "./connection.js";
 import { startFiles } from "./files.js";
@@ -25,4 +26,4 @@ for (const start of [
 ]) start();
 
 // For benchmarks/studio.py and the tests in a browser.
-window.studio = { lastFrame, tallied };
+window.studio = { lastFrame, on, tallied };

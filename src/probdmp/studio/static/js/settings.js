@@ -25,7 +25,7 @@ function show() {
   if (document.activeElement !== byId("alpha")) byId("alpha").value = nearest(settings.alpha);
   setText(byId("alpha-text"), percent(RATES[byId("alpha").value]));
   byId("calibration").hidden = !calibration;
-  if (calibration) setText(byId("calibration-text"), sentence(calibration, settings.alpha));
+  if (calibration) setText(byId("calibration-text"), `${sentence(calibration, settings.alpha)} ${calibration.note}`.trim());
 }
 
 function sentence({ n, attainable, text }, alpha) {

@@ -5,7 +5,7 @@ import { decodeFrame } from "./frames.js";
 
 const FIRST_WAIT = 500; // ms; doubles up to LONGEST_WAIT
 const TAKEN_OVER = 4001; // another page has this session now
-const LONGEST_WAIT = 8000;
+const LONGEST_WAIT = 2000;
 
 let socket = null;
 let wait = FIRST_WAIT;

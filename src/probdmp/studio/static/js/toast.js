@@ -3,7 +3,7 @@
 import { on } from "./bus.js";
 import { byId, make } from "./dom.js";
 
-const LASTS = 6000; // ms; errors stay until they are read
+const LASTS = 6000; // ms; errors, and what happened while nobody looked, stay until they are dismissed
 let timer = null;
 
 function show({ text, action, act, stays = false }) {
