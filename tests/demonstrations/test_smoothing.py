@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 
 from probdmp.demonstrations import Demonstration, noise_stds, smooth_path, synthetic_letters
 from probdmp.demonstrations.letters import WriterVariation
-from probdmp.demonstrations.smoothing import savitzky_golay
 from probdmp.errors import InputError
 
 seeds = st.integers(0, 2**32 - 1)
@@ -24,17 +23,6 @@ def test_cubics_are_left_untouched(seed, n_samples, dt, window):
     path = smooth_path(Demonstration(powers @ coefficients, dt), window)
     np.testing.assert_allclose(path.positions, powers @ coefficients, atol=1e-11)
     np.testing.assert_allclose(path.velocities * duration, slopes @ coefficients * duration, atol=1e-9)
-
-
-@given(seeds, st.integers(2, 30), st.integers(0, 100), st.integers(1, 3))
-def test_the_filter_is_that_of_scipy(seed, half, more, order):
-    from scipy.signal import savgol_filter
-
-    length = 2 * half + 1
-    path = np.random.default_rng(seed).standard_normal((length + more, 2))
-    smooth, slopes = savitzky_golay(path, length, order)
-    np.testing.assert_allclose(smooth, savgol_filter(path, length, order, axis=0), atol=1e-9)
-    np.testing.assert_allclose(slopes, savgol_filter(path, length, order, deriv=1, axis=0), atol=1e-9)
 
 
 @pytest.mark.parametrize(("n_samples", "window"), [(3, 0.5), (7, 0.5), (12, 0.05), (79, 0.05), (200, 0.0)])

@@ -358,9 +358,11 @@ def test_points_are_on_the_lines_between_samples(n, n_times, n_signals, n_points
     )
     after, beyond = rng.integers(0, n_times, n_points), rng.random(n_points)
     places = after - np.where(after > 0, beyond, 0)
+    plain, points = np.empty((2, n_points, n_signals, n))
+    _kernels_numpy.points_on_lines(values, after, beyond, starts, ranges, plain)
     for module in {_kernels_numpy, _compiled() if kernels.COMPILED else _kernels_numpy}:
-        points = np.empty((n_points, n_signals, n))
         module.points_on_lines(values, after, beyond, starts, ranges, points)
+        np.testing.assert_array_equal(points, plain)
         for i, recording in enumerate(values):
             for d, column in enumerate(recording.T):
                 expected = (np.interp(places, np.arange(n_times), column) - starts[i, d]) / ranges[d]

@@ -3,8 +3,7 @@
 Learning a forcing term needs accelerations, and differentiating twice amplifies sensor noise by 1/dt^2. The choice made here
 is the Savitzky-Golay filter: in a window around each sample a cubic is fitted by least squares. It leaves cubics untouched,
 needs no boundary conditions and its window is a fraction of the movement, so that it does not depend on the sampling rate.
-Source: Savitzky & Golay, Analytical Chemistry 36 (1964). SciPy has it too, and tests compare; but its module of signals takes
-longer to load than a movement to learn.
+Source: Savitzky & Golay, Analytical Chemistry 36 (1964); the implementation is SciPy's.
 """
 
 from typing import NamedTuple
@@ -44,42 +43,17 @@ def smooth_path(demonstration: Demonstration, window: float) -> SmoothPath:
     InputError
         If the first or last sample or most of a degree of freedom is missing: start and goal are read there.
     """
+    from scipy.signal import savgol_filter
+
     positions, dt = _without_gaps(demonstration), demonstration.dt
     n_samples = len(positions)
     length = 2 * int(window * n_samples / 2) + 1
     order = min(POLYNOMIAL_ORDER, n_samples - 1)
     if length <= order + 1:  # nothing to average over: central differences of the positions as they are
         return SmoothPath(positions, np.gradient(positions, dt, axis=0, edge_order=2))
-    smooth, slopes = savitzky_golay(positions, length, order)
-    return SmoothPath(smooth, slopes / dt)
-
-
-def savitzky_golay(path: FloatArray, length: int, order: int) -> tuple[FloatArray, FloatArray]:
-    """Polynomials fitted by least squares to windows of a path, at the sample in the middle of each.
-
-    Parameters
-    ----------
-    path : (T, D) array, data units.
-    length : samples in a window, odd, at most T. Samples near an end are those of the first or last window.
-    order : of the polynomials, less than `length`.
-
-    Returns
-    -------
-    Values, (T, D) data units, and slopes, (T, D) data units per sample.
-    """
-    half = length // 2
-    places = np.arange(-half, half + 1) / half
-    powers = np.vander(places, order + 1, increasing=True)
-    fit = np.linalg.pinv(powers)  # (order + 1, length): from samples to coefficients
-    derived = np.zeros_like(powers)
-    derived[:, 1:] = powers[:, :-1] * (np.arange(1, order + 1) / half)
-    windows = np.lib.stride_tricks.sliding_window_view(path, length, axis=0)  # (T - length + 1, D, length)
-    first, last = fit @ path[:length], fit @ path[-length:]
-    smooth, slopes = (
-        np.concatenate([basis[:half] @ first, windows @ (basis[half] @ fit), basis[half + 1 :] @ last])
-        for basis in (powers, derived)
+    return SmoothPath(
+        savgol_filter(positions, length, order, axis=0), savgol_filter(positions, length, order, deriv=1, delta=dt, axis=0)
     )
-    return smooth, slopes
 
 
 def noise_stds(positions: FloatArray) -> FloatArray:
@@ -115,13 +89,15 @@ def without_noise(positions: FloatArray) -> FloatArray:
     (T, D) array, data units; NaN where a degree of freedom was never measured. Recordings too short to smooth keep their
     noise.
     """
+    from scipy.signal import savgol_filter
+
     n_samples, path = len(positions), np.array(positions)
     for column in path.T:
         seen = np.flatnonzero(~np.isnan(column))
         if len(seen):
             column[:] = np.interp(np.arange(n_samples), seen, column[seen])
             if n_samples >= DENOISING_WINDOW:
-                column[:] = savitzky_golay(column[:, None], DENOISING_WINDOW, POLYNOMIAL_ORDER)[0][:, 0]
+                column[:] = savgol_filter(column, DENOISING_WINDOW, POLYNOMIAL_ORDER)
     return path
 
 

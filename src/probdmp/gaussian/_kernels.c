@@ -23,6 +23,12 @@
 #define INLINE static inline
 #endif
 
+#if defined(__GNUC__) && !defined(__clang__)
+#define AS_WRITTEN __attribute__((optimize("fp-contract=off"))) /* other compilers contract expressions, not statements */
+#else
+#define AS_WRITTEN
+#endif
+
 #define MOST_STATES 4
 #define OUTPUTS 4 /* rows of maps that are multiplied with a window at once */
 #define TILE 512 /* observations of each that are brought side by side at a time */
@@ -1236,8 +1242,8 @@ static void look_for_odd(const Recordings *s, int64_t *is_plain)
     }
 }
 
-/* WIDTH recordings at a time, as their points are neighbours. */
-static void draw_lines(const Recordings *s, double *points)
+/* WIDTH recordings at a time, as their points are neighbours. Rounded as NumPy does: ticks are found in either way, by execution. */
+static AS_WRITTEN void draw_lines(const Recordings *s, double *points)
 {
     const Py_ssize_t d = s->n_signals, size = s->n_times * d;
     for (Py_ssize_t first = 0; first < s->n; first += WIDTH) {
@@ -1247,8 +1253,11 @@ static void draw_lines(const Recordings *s, double *points)
             for (Py_ssize_t j = 0; j < d; j++) {
                 double *to = points + (k * d + j) * s->n + first;
                 const double *v = s->values + first * size + j, *start = s->starts + first * d + j;
-                for (Py_ssize_t w = 0; w < width; w++, v += size)
-                    to[w] = ((v[before] - v[after]) * s->beyond[k] + v[after] - start[w * d]) / s->ranges[j];
+                for (Py_ssize_t w = 0; w < width; w++, v += size) {
+                    double point = (v[before] - v[after]) * s->beyond[k];
+                    point += v[after];
+                    to[w] = (point - start[w * d]) / s->ranges[j];
+                }
             }
         }
     }
