@@ -147,7 +147,7 @@ def check_laws(demonstrations, experiment, n_classes):
             assert rate.n == n
             assert rate.low <= rate.rate == rate.count / n <= rate.high
             interval = binomtest(rate.count, n).proportion_ci(0.95, method="exact")
-            assert (rate.low, rate.high) == (interval.low, interval.high)
+            assert (rate.low, rate.high) == pytest.approx((interval.low, interval.high), rel=1e-11)
         assert held.detected.count <= held.ever.count
         # An alarm before the onset cannot know of the fault: it is a false alarm of the same execution undisturbed.
         early = [o for o in outcomes if o.alarms["hold"] is not None and o.alarms["hold"] < o.onsets["hold"]]
