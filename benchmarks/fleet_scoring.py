@@ -1,15 +1,19 @@
 """How long a fleet's executions take to be scored, and how much memory.
 
     python benchmarks/fleet_scoring.py 1000000 --jobs 2
+    python benchmarks/fleet_scoring.py 60000 --profile
 
 Writes N executions of the built-in letters, 200 samples of two degrees of freedom each, drawn from primitives learned from
 them, two in a hundred of them blocked half-way; and then runs `probdmp score` on them. Each execution has noise of its own, so
-that nothing about the file is easier than it would be with a real one.
+that nothing about the file is easier than it would be with a real one. With --profile it says instead where the time of one
+thread goes.
 """
 
 import argparse
+import cProfile
 import json
 import os
+import pstats
 import resource
 import subprocess
 import sys
@@ -24,6 +28,9 @@ import pyarrow.parquet as pq
 
 from probdmp import FailureDetector, PrimitiveLibrary, synthetic_letters
 from probdmp.checks import FloatArray
+from probdmp.fleet.plan import parts_of
+from probdmp.fleet.scorer import Scorer
+from probdmp.io import ParquetExecutions
 
 N_SAMPLES = 200
 POOL = 128
@@ -33,6 +40,16 @@ ROWS = 2**20
 """Of a row group."""
 EVERY = 0.05
 """Seconds between looks at the memory of processes."""
+STAGES = {
+    "reading": ("parquet_executions.py", "_read_samples"),
+    "log-likelihood": ("scoring.py", "score_batch"),
+    "ticks": ("recorded_ticks.py", "record_ticks"),
+    "windows of the trajectory": ("trajectory_model.py", "evidence"),
+    "when it was most surprising": ("judgement.py", "_moments"),
+    "contributions": ("judgement.py", "_shares"),
+    "reasons of those that failed": ("judgement.py", "_reasons"),
+}
+"""Functions that stand for a stage, by their file and name."""
 
 
 def learned(path: Path) -> PrimitiveLibrary:
@@ -111,6 +128,32 @@ def measured(command: list[str]) -> dict[str, Any]:
     return {**json.loads(process.stdout.read()), **used}
 
 
+def profiled(model: Path, executions: Path) -> list[str]:
+    """Where the time of one thread goes, by stage, after what is computed once; lines of text."""
+    scorer, file = Scorer(model.read_bytes(), model.name), ParquetExecutions(str(executions))
+    columns, parts = scorer.columns(file.layout, file.path), parts_of(file, file.executions())
+    if len(parts) < 2:
+        raise SystemExit(f"Expected executions for two parts or more, got {len(parts)}: ask for more of them.")
+
+    def score(part: Any) -> None:
+        for table in file.read(part.span, columns):
+            scorer.score(table)
+
+    score(parts[0])
+    profiler, began = cProfile.Profile(), time.perf_counter()
+    for part in parts[1:]:
+        profiler.runcall(score, part)
+    each = (time.perf_counter() - began) / sum(part.n_executions for part in parts[1:])
+    found = dict.fromkeys(STAGES, 0.0)
+    total = 0.0
+    for (path, _, function), (_, _, own, cumulative, _) in pstats.Stats(profiler).stats.items():  # type: ignore[attr-defined]
+        total += own
+        found |= {name: cumulative for name, stage in STAGES.items() if stage == (Path(path).name, function)}
+    found["the rest"] = total - sum(found.values())
+    lines = [f"  {name:<30} {100 * seconds / total:3.0f} %" for name, seconds in found.items()]
+    return [f"one thread, {1e6 * each:.0f} µs per execution while being profiled, of which", *lines]
+
+
 def _tree(root: int) -> list[int]:
     """A process and its descendants."""
     parents = {}
@@ -141,6 +184,7 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--dense", action="store_true", help="one row per execution")
     parser.add_argument("--told", action="store_true", help="executions are told their goal and duration")
+    parser.add_argument("--profile", action="store_true", help="say where the time of one thread goes")
     parser.add_argument("--folder", type=Path, help="where files go and stay; what is there is used again")
     chosen = parser.parse_args()
     with tempfile.TemporaryDirectory() as temporary:
@@ -151,6 +195,9 @@ def main() -> None:
         library = PrimitiveLibrary.load(model) if model.exists() else learned(model)
         if not executions.exists():
             write_executions(executions, library, chosen.executions, chosen.dense, chosen.told)
+        if chosen.profile:
+            print("\n".join(profiled(model, executions)))
+            return
         scores = folder / "scores.parquet"
         command = [sys.executable, "-m", "probdmp", "score", str(model), str(executions), "-o", str(scores)]
         found = measured([*command, "--jobs", str(chosen.jobs), "--restart", "--json"])

@@ -301,8 +301,8 @@ class ProbabilisticDMP(HasFamiliarVerbs):
         ----------
         points : (time, position, std) each: seconds of the learned duration; (D,) array, data units, NaN for a degree of
             freedom that is free; how far the movement may pass from it, a number or (D,) array, data units, > 0; executions
-            deviate around that as anywhere. Positions are those of a movement from the learned start: from another one, it
-            passes as much further on.
+            deviate around that as anywhere. Positions are those of a movement from the learned start to the learned goal: one
+            from or to elsewhere passes elsewhere.
         """
         return self._with(condition_primitive(self._learned(), points))
 
