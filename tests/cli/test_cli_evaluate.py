@@ -6,6 +6,7 @@ import sys
 from html import unescape
 
 import pytest
+import typer
 
 from probdmp import write_demonstrations
 from probdmp.cli.evaluation_table import print_evaluation
@@ -228,6 +229,18 @@ def test_demo_without_matplotlib_says_what_to_install(run, monkeypatch, tmp_path
     assert "Report" not in result.stdout
     assert "pip install 'probdmp[plot]'" in result.stderr
     assert not (tmp_path / "r.html").exists()
+
+
+def test_demo_without_matplotlib_says_so_before_the_work(run, monkeypatch, tmp_path):
+    def interrupted(*_):
+        raise typer.Exit(3)
+
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    monkeypatch.setattr("probdmp.cli.demo.evaluation_of", interrupted)
+    result = run(*DEMO, "-o", tmp_path / "r.html")
+    assert result.exit_code == 3
+    assert "no report" in result.stderr
+    assert "pip install 'probdmp[plot]'" in result.stderr
 
 
 def test_demo_prints_the_document_of_the_evaluation(run, tmp_path, monkeypatch):

@@ -1,7 +1,9 @@
 """Recordings on the command line: CSV files, several at once, `probdmp perturb`, `probdmp convert`, and the system."""
 
 import json
+import tomllib
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -248,6 +250,16 @@ def test_the_system(run, run_json, monkeypatch):
     assert "/nowhere, which is no folder" in shown
     for words in ("numpy", "scipy", "BLAS", "processors", "python"):
         assert words in shown
+
+
+def test_the_system_names_every_extra_that_brings_something_to_those_who_use_it():
+    from probdmp.cli.system import EXTRAS
+
+    for_developers = {"test", "docs", "dev"}
+    text = (Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8")
+    extras = tomllib.loads(text)["project"]["optional-dependencies"]
+    brought = {name: tuple(line.split(">=")[0] for line in lines) for name, lines in extras.items()}
+    assert brought == EXTRAS | {name: brought[name] for name in for_developers}
 
 
 def test_inspect_wants_one_thing(folder, run):

@@ -403,3 +403,15 @@ def test_a_refused_observation_leaves_no_trace(primitive, path):
 def test_too_many_ticks_are_refused(primitive):
     with pytest.raises(InputError, match="a duration of 1 to 100000 steps of dt"):
         OnlineExecution(primitive, task_for(primitive), 1e-9)
+
+
+# --- how it shows itself ----------------------------------------------------------------------------------------------
+
+
+def test_a_step_shows_itself_in_one_line(execution, path):
+    step = execution.step(path[0])
+    q0, q1 = step.position
+    assert str(step) == repr(step) == f"<ExecutionStep due at 0.020 s: q0 {q0:.4g}, q1 {q1:.4g}>"
+    stopped = step._replace(test_ratio=1.234, verdict=SimpleNamespace(failed=True), held=np.zeros((2, 3)))
+    assert repr(stopped) == "<ExecutionStep due at 0.020 s: q0 0, q1 0; test ratio 1.23; failed; held>"
+    assert "failed" not in repr(step._replace(verdict=SimpleNamespace(failed=False)))

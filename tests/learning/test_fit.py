@@ -360,3 +360,11 @@ def test_too_coarse_for_semi_implicit_euler_is_said():
 def test_options_that_cannot_be_used(options, match):
     with pytest.raises(InputError, match=f"Expected {match}"):
         LearningOptions(**options)
+
+
+@pytest.mark.parametrize("n", [10, 12, 20])
+def test_demonstrations_of_one_rate_teach_that_very_rate(n):
+    """The mean of as many equal steps need not be that step: 0.010000000000000002."""
+    demonstrations = synthetic_letters(n, letters="a")
+    assert np.mean([d.dt for d in demonstrations]) != 0.01
+    assert learn(demonstrations).dt == 0.01

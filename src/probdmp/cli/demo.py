@@ -2,7 +2,7 @@
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -12,10 +12,6 @@ from probdmp.cli.exit_codes import message, usage
 from probdmp.cli.options import Json, Seed, check_output
 from probdmp.cli.output import print_json, print_line
 from probdmp.errors import MissingExtraError
-
-if TYPE_CHECKING:
-    from probdmp.demonstrations import Demonstration
-    from probdmp.evaluation import Evaluation
 
 __all__ = ["demo"]
 
@@ -38,8 +34,8 @@ def demo(
     Prints a table of false alarms and detected failures: the paper's as published, the calibrated detector, and the paper's
     rule on the same executions. The report says more about the calibrated detector, and shows an execution.
 
-    The letters are synthetic: a writer who varies shape, size, slant, tempo and place. Takes less than a minute; fewer
-    --letters take less.
+    The letters are synthetic: a writer who varies shape, size, slant, tempo and place. Takes one to
+    two minutes; fewer --letters take less.
     """
     check_output(output, ".html")
     from probdmp.demonstrations import LETTERS, synthetic_letters
@@ -49,6 +45,7 @@ def demo(
     with usage():
         experiment = Experiment(train, test, seed, detector="calibrated", faults=faults_of(fault), traces=True)
         demonstrations = synthetic_letters(train + test, seed, letters)
+    has_report = _can_report()
     paper = READINGS[0].name
     result = evaluation_of(demonstrations, experiment, {**DETECTORS["calibrated"], paper: DETECTORS["paper"][paper]})
     command = f"probdmp demo --letters {letters} --train {train} --test {test} --seed {seed} --fault {fault}"
@@ -56,14 +53,18 @@ def demo(
         print_json(result.as_dict(command))
     else:
         print_evaluation(result)
-    if _reported(output, result, demonstrations, command) and not as_json:
-        print_line(f"Report: {output}")
+    if has_report:
+        write_evaluation(output, result, demonstrations, command)
+        if not as_json:
+            print_line(f"Report: {output}")
 
 
-def _reported(path: Path, result: "Evaluation", demonstrations: list["Demonstration"], command: str) -> bool:
-    """Write the report; False if what draws it is not installed, which is said but is no failure."""
+def _can_report() -> bool:
+    """False if what draws the report is not installed, which is said, before the wait, but is no failure."""
+    from probdmp.plotting.style import require_matplotlib
+
     try:
-        write_evaluation(path, result, demonstrations, command)
+        require_matplotlib()
     except MissingExtraError as error:
         print(f"probdmp: no report: {message(error)}", file=sys.stderr)
         return False

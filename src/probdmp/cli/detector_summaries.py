@@ -14,6 +14,9 @@ __all__ = ["calibration_text", "detector_summary", "percent", "print_detector", 
 
 TOLD = {"known": "goal and duration told", "nominal": "only the start told"}
 SOURCES = {"leave_one_out": "leave-one-out", "held_out": "held-out"}
+FLAGGED = (
+    "Flagged, since they surprise more than chance explains, with the share of their executions among the most surprising tenth"
+)
 
 
 def verdict_summary(verdict: "Verdict", calibration: "CalibrationFacts | None") -> dict[str, Any]:
@@ -60,13 +63,13 @@ def detector_summary(detector: "FailureDetector") -> dict[str, Any]:
 
 
 def calibration_text(facts: "CalibrationFacts") -> str:
-    """One line: what was asked for, from how many executions, what they can vouch for, who is flagged."""
+    """One line: what was asked for, from how many executions, what they can vouch for, who is flagged and why."""
     flagged = ", ".join(f"{label!r} {percent(share)}" for label, share in facts.suspects.items())
     of_which = f" of {name_text(facts.label)!r}" if facts.label else ""
     return (
         f"With {TOLD[facts.task]}{of_which}: {percent(facts.false_alarm_rate)} false alarms per execution asked for, "
         f"{percent(facts.attainable_rate)} attainable with n = {facts.n} ({SOURCES[facts.source]}), "
-        f"{facts.method}, {facts.guarantee}" + (f"; flagged: {flagged}." if flagged else ".")
+        f"{facts.method}, {facts.guarantee}." + (f" {FLAGGED}: {flagged}." if flagged else "")
     )
 
 

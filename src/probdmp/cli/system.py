@@ -20,6 +20,7 @@ EXTRAS = {
     "sklearn": ("scikit-learn",),
     "foxglove": ("foxglove-sdk",),
     "rerun": ("rerun-sdk",),
+    "studio": ("starlette", "uvicorn", "websockets"),
 }
 """By extra: the packages that it brings."""
 RECORDINGS = "PROBDMP_RECORDINGS"

@@ -55,6 +55,13 @@ class ExecutionStep(NamedTuple):
     array: SensorArray
     """The sensors."""
 
+    def __repr__(self) -> str:
+        due = ", ".join(f"{name} {value:.4g}" for name, value in zip(self.primitive.names, self.position, strict=True))
+        ratio = "" if np.isnan(self.test_ratio) else f"; test ratio {self.test_ratio:.2f}"
+        failed = "; failed" if self.verdict is not None and self.verdict.failed else ""
+        held = "; held" if self.held is not None else ""
+        return f"<ExecutionStep due at {self.time:.3f} s: {due}{ratio}{failed}{held}>"
+
     @property
     def position(self) -> FloatArray:
         """(D,) array, data units."""

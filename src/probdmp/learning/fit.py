@@ -123,7 +123,7 @@ def _still_primitive(
         start_velocities=np.mean(phase_velocities, axis=0),
         start_covariances=start_covariances,
         duration=float(np.mean(tasks.duration)),
-        dt=float(np.mean(dts)),
+        dt=float(dts[0] if np.all(dts == dts[0]) else np.mean(dts)),  # the mean of 20 times 0.01 is not quite 0.01
         phase_step=float(np.mean(dts / tasks.duration)),
         n_demonstrations=k,
         names=first.names,
