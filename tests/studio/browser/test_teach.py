@@ -4,7 +4,7 @@ from studio_browser import Studio, line
 
 
 def test_a_letter_drawn_three_times_has_a_band(studio: Studio) -> None:
-    studio.says("#hint", "Draw an a, three times.")
+    studio.says("#hint", "Draw an a, in one stroke, three times.")
     studio.teach(strokes=2)
     studio.draw(shift=1)
     studio.says(".count", "3 strokes, learned")

@@ -5,13 +5,14 @@ import { byId, make } from "./dom.js";
 import { session } from "./session.js";
 
 const LARGEST = 64 * 1024 * 1024;
+const FETCHED = 60000; // ms after which a file that was saved is surely on its way to the disk
 const DOWNLOADS = [
-  ["demonstrations.npz", "demonstrations, as probdmp and NumPy read them"],
+  ["demonstrations.npz", "demonstrations, as probdmp and NumPy read them; those from files in their own unit and place"],
   ["demonstrations.csv", "demonstrations, for spreadsheets"],
   ["model.probdmp", "what was learned, with its failure detector"],
   ["picture.svg", "the band as a picture that scales"],
   ["picture.png", "the band as a picture"],
-  ["session.zip", "all of these, with the commands"],
+  ["session.zip", "all of these that there are, with the commands"],
 ];
 
 async function upload(file, execution) {
@@ -34,7 +35,32 @@ async function openAll(files, execution) {
   for (const file of files) await upload(file, execution);
 }
 
-const describe = (labels) => Object.entries(labels ?? {}).map(([name, count]) => `${name} (${count})`).join(", ");
+const describe = (labels) => Object.entries(labels ?? {}).map(([name, count]) => `${name} (${count || "learned"})`).join(", ");
+
+/** Saves a file; what the server says against it is shown, which a plain link would hide. */
+async function download(name) {
+  try {
+    const reply = await fetch(`/download/${session.id}/${name}`);
+    if (!reply.ok) throw (await reply.json()).error;
+    const link = make("a", { href: URL.createObjectURL(await reply.blob()), download: name });
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), FETCHED);
+  } catch (error) {
+    byId("files").close(); // it would cover what is said
+    const lost = { expected: "an answer of the server", got: "none", hint: `${name} was not saved: is the server still running?` };
+    emit("error", error.expected ? error : lost);
+  }
+}
+
+function saved([name, what]) {
+  const missing = name.startsWith("picture") ? session.state.pictures_missing : "";
+  const link = make("a", missing ? { role: "link", "aria-disabled": "true", text: name } : { href: `/download/${session.id}/${name}`, download: name, text: name });
+  link.addEventListener("click", (event) => {
+    event.preventDefault();
+    if (!missing) download(name);
+  });
+  return make("li", {}, link, ` ${what}${missing && `. ${missing}`}`);
+}
 
 function startDropping() {
   const zone = byId("dropzone");
@@ -68,12 +94,13 @@ export function startFiles() {
     });
   }
   byId("open-files").addEventListener("click", () => {
-    const links = DOWNLOADS.map(([name, what]) => make("li", {},
-      make("a", { href: `/download/${session.id}/${name}`, download: name, text: name }), ` ${what}`));
-    byId("downloads").replaceChildren(...links);
+    byId("downloads").replaceChildren(...DOWNLOADS.map(saved));
     byId("files").showModal();
   });
   on("uploaded", ({ name, execution, imported }) => {
-    emit("toast", { text: `${name} was opened: ${describe(imported?.labels)}${execution ? ", to replay" : ""}.` });
+    const note = imported?.note ? ` ${imported.note}` : "";
+    const taught = Object.values(imported?.labels ?? {}).some(Boolean);
+    const use = execution ? " as executions to replay" : taught ? " as demonstrations" : "";
+    emit("toast", { text: `${name} was opened${use}: ${describe(imported?.labels)}.${note}`, stays: Boolean(note) });
   });
 }

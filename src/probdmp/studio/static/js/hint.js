@@ -16,7 +16,8 @@ const withArticle = (name) => (/^[a-z]$/i.test(name) ? `${/[aefhilmnorsx]/i.test
 function teach() {
   const strokes = strokesOf(selected()).length;
   const name = selected();
-  if (!strokes) return `Draw ${withArticle(name)}, three times.`;
+  if (!strokes && band()) return "It knows the movement. Press Play.";
+  if (!strokes) return `Draw ${withArticle(name)}, in one stroke, three times.`;
   if (strokes < ENOUGH) return ENOUGH - strokes === 1 ? "Once more." : "Again, twice more: it learns how you vary.";
   if (!band()) return learning ? "Learning …" : "Draw it once more.";
   return "It knows the movement. Press Play.";
