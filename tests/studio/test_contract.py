@@ -181,6 +181,19 @@ def test_a_held_pen_is_caught(taught):
     taught.ask("pointer", "verdict", "played", mode="none")
 
 
+def test_the_cause_is_told_as_soon_as_it_is_known(taught):
+    """It is looked into for some ticks after the alarm, while the pen is still held."""
+    taught.ask("play", "playing", speed=0.5)
+    x, y = rows_of(taught.watch(20)[-1])[1][0].tolist()
+    taught.say("pointer", mode="hold", x=x, y=y)
+    told = taught.hear("verdict", where=lambda verdict: verdict["cause"] == "held")
+    assert "final" not in told
+    taught.watch(20)  # each a tick or more: until then it is looked into
+    taught.say("pointer", mode="none")
+    final = taught.hear("verdict", where=lambda verdict: verdict.get("final"))
+    assert (final["cause"], final["time"]) == ("held", told["time"])
+
+
 def test_playing_can_be_stopped(taught):
     taught.ask("play", "playing", speed=0.1)
     assert taught.ask("stop", "played")["completed"] is False

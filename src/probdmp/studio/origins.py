@@ -88,7 +88,7 @@ def origin_in(message: Mapping[str, Any]) -> Origin | None:
         raise InputTypeError("an origin as it was shown", f"{value!r:.100}")
     names = tuple(name_of({"label": name}) for name in value["names"])
     units = "" if value.get("units", "") == "" else name_of(value, "units")
-    shift = check_array(value.get("shift"), "shift", (len(CANVAS),))
+    shift = check_array(value.get("shift", ()), "shift", (len(CANVAS),))
     if not all(abs(x) <= FARTHEST / FINEST for x in shift.tolist()):
         raise InputError("a shift to the canvas", f"{shift!r:.100}")
     return Origin(names, units, Placement(number_of(value, "scale", FINEST, 1 / FINEST), shift))

@@ -147,7 +147,7 @@ class Room:
             now = time.perf_counter()
             tick, shown = await asyncio.to_thread(playing.advance, now - shown), now
             self._show_tick(PLAYING, tick)
-            if playing.has_new_alarm():
+            if playing.has_news():
                 self.session.send(views.verdict_view(playing.execution.verdict))
         self.session.send(views.verdict_view(playing.execution.verdict) | {"final": True})
         self.session.send({"type": "played", "completed": True})
@@ -173,7 +173,7 @@ class Room:
         """More of what is drawn."""
         tracing = self._traced()
         self._show_tick(TRACING, await tracing.add(points))
-        if tracing.execution is not None and tracing.has_new_alarm():
+        if tracing.execution is not None and tracing.has_news():
             self.session.send(views.verdict_view(tracing.execution.verdict))
         if self._recognising is None or self._recognising.done():
             self._recognising = asyncio.create_task(self._recognise(tracing, False))
