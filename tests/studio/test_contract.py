@@ -326,6 +326,16 @@ def test_strokes_in_millimetres_are_taught_again_as_such(studio, page, of_a_robo
             other.ask("stroke", "error", label="d", points=points_of(of_a_robot[0]), origin=broken)
 
 
+def test_a_file_whose_unit_is_another_than_the_letters_is_not_taken_in_part(page, drawn, of_a_robot, tmp_path):
+    page.ask("stroke", "band", label="z", points=points_of(drawn[0]))
+    write_demonstrations(tmp_path / "robot.npz", [of_a_robot[0], replace(of_a_robot[1], label="z")])
+    with page.studio.http() as http:
+        reply = http.post(f"/upload/{page.session}?name=robot.npz", content=(tmp_path / "robot.npz").read_bytes())
+    assert reply.status_code == 400
+    assert reply.json()["error"]["expected"] == "recordings of 'z' as those that are there, x, y in units of the canvas"
+    assert [(one["name"], len(one["strokes"])) for one in page.state()["labels"]] == [("z", 1)]
+
+
 def test_letters_of_several_units_are_saved_in_several_files(page, drawn, of_a_robot, tmp_path):
     page.ask("stroke", "band", label="drawn", points=points_of(drawn[0]))
     write_demonstrations(tmp_path / "robot.npz", of_a_robot)

@@ -4,7 +4,7 @@ import io
 import os
 import zipfile
 from collections import Counter
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path, PurePath
 from tempfile import TemporaryDirectory
@@ -18,7 +18,7 @@ from probdmp.io.formats import FORMATS
 from probdmp.studio import jobs
 from probdmp.studio.commands import commands_of
 from probdmp.studio.fields import name_of
-from probdmp.studio.limits import DT, LARGEST_UPLOAD, LONGEST_NAME, LONGEST_STROKE
+from probdmp.studio.limits import DT, IMPORTED, LARGEST_UPLOAD, LONGEST_NAME, LONGEST_STROKE
 from probdmp.studio.origins import origin_of
 from probdmp.studio.room import Room
 from probdmp.studio.views import pictures_missing
@@ -61,6 +61,8 @@ class Import(NamedTuple):
     """Recordings of each label; 0 for a movement that came without any."""
     note: str
     """How they are shown, if not as they are."""
+    first: dict[str, int]
+    """Place of the first one among the recordings of each label, or among the executions."""
 
 
 async def add_file(room: Room, name: str, body: bytes, as_execution: bool) -> Import:
@@ -92,18 +94,27 @@ def add_contents(room: Room, stem: str, contents: jobs.Contents, as_execution: b
     if as_execution and not shown:
         raise DataFileError("recorded executions to replay", "a model", "Open it to use it instead.")
     if as_execution:
+        first = {IMPORTED: len(session.imported)}
         session.add_imported(shown)
     else:
+        first = {label: session.n_recordings(label) if label in session.movements else 0 for label in _labels(library, shown)}
         detector = contents.detector
         planned = {label: origin_of([_planned(learned)]) for label, learned in library.items()}
         session.add_movements(library, detector if detector is not None and detector.sensors_ is None else None, planned)
         origins = [*planned.values(), *([origin_of(shown)] if shown else [])]
-        for label, members in group_by_label(shown).items():
+        groups = group_by_label(shown)
+        for label in groups:
+            session.origin_with(label, origins[-1])  # all or none
+        for label, members in groups.items():
             session.add_strokes(label, members, origins[-1])
         room.learner.learn(*dict.fromkeys(d.label for d in shown))
     room.show_state()
     note = next((origin.note for origin in origins if origin.note), "")
-    return Import(dict.fromkeys(library, 0) | Counter(d.label for d in shown), note)
+    return Import(_labels(library, shown), note, first)
+
+
+def _labels(library: Mapping[str, ProbabilisticDMP], shown: list[Demonstration]) -> dict[str, int]:
+    return dict.fromkeys(library, 0) | Counter(d.label for d in shown)
 
 
 def _planned(learned: ProbabilisticDMP) -> Demonstration:

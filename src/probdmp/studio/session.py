@@ -128,13 +128,26 @@ class Session:
         if held + len(strokes) > MOST_STROKES:
             hint = "Delete some, or write what you have to a file and use probdmp fit."
             raise InputError(f"at most {MOST_STROKES} demonstrations of a label", f"{held + len(strokes)}", hint)
+        joined = self.origin_with(label, origin)
         movement = self.add_label(label)
-        if origin is not None:
-            is_new = not movement.strokes and movement.learned is None
-            movement.origin = origin if is_new else movement.origin.joined(origin, label)
+        movement.origin = joined
         movement.strokes.extend(map(movement.origin.of, strokes))
         movement.version += 1
         self.select(label)
+
+    def origin_with(self, label: str, origin: Origin | None) -> Origin:
+        """Of a label when recordings join it; None: they are drawn where it is shown.
+
+        Raises
+        ------
+        InputError
+            If they cannot.
+        """
+        movement = self.movements.get(label, Movement())
+        if origin is None:
+            return movement.origin
+        is_new = not movement.strokes and movement.learned is None
+        return origin if is_new else movement.origin.joined(origin, label)
 
     def select(self, label: str) -> None:
         """Speak of another movement from now on, executed as learned."""

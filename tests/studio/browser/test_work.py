@@ -143,6 +143,26 @@ def test_pictures_that_nothing_draws_are_no_links(studio: Studio) -> None:
     studio.says("#downloads", "pip install")
 
 
+def test_what_a_drop_has_taught_is_taken_back(studio: Studio, letters: Path) -> None:
+    for count in (4, 8):
+        drop(studio, letters)
+        studio.lists(".count", *[f"{count} strokes, learned"] * 2)
+    studio.page.get_by_role("button", name="Undo").click()
+    studio.lists(".count", *["4 strokes, learned"] * 2)
+
+
+def test_an_execution_that_is_dropped_is_the_one_to_replay(studio: Studio, letters: Path) -> None:
+    studio.use_example()
+    studio.mode("Replay")
+    studio.page.select_option("#recording", index=2)
+    drop(studio, letters)
+    studio.says("#toast", r"was opened as executions to replay: b \(4\), c \(4\)")
+    chosen = "document.getElementById('recording').selectedOptions[0].textContent"
+    studio.becomes(chosen, "execution 1: b")
+    drop(studio, letters)
+    studio.becomes(chosen, "execution 9: b")
+
+
 def test_a_recording_is_replayed_and_scrubbed(studio: Studio) -> None:
     page = studio.page
     studio.use_example()

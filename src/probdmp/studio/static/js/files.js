@@ -2,7 +2,8 @@
 
 import { emit, on } from "./bus.js";
 import { byId, make } from "./dom.js";
-import { session } from "./session.js";
+import { session, strokesOf } from "./session.js";
+import { send } from "./socket.js";
 
 const LARGEST = 64 * 1024 * 1024;
 const FETCHED = 60000; // ms after which a file that was saved is surely on its way to the disk
@@ -62,6 +63,14 @@ function saved([name, what]) {
   return make("li", {}, link, ` ${what}${missing && `. ${missing}`}`);
 }
 
+/** Forgets what came from a file: recordings, and letters that there were none of before. */
+function takeBack({ labels, first }) {
+  for (const [label, count] of Object.entries(labels)) {
+    if (first[label] === 0 && strokesOf(label).length === count) send("delete_label", { label });
+    else for (let k = first[label] + count - 1; k >= first[label]; k -= 1) send("delete_stroke", { label, index: k });
+  }
+}
+
 function startDropping() {
   const zone = byId("dropzone");
   let depth = 0;
@@ -101,6 +110,7 @@ export function startFiles() {
     const note = imported?.note ? ` ${imported.note}` : "";
     const taught = Object.values(imported?.labels ?? {}).some(Boolean);
     const use = execution ? " as executions to replay" : taught ? " as demonstrations" : "";
-    emit("toast", { text: `${name} was opened${use}: ${describe(imported?.labels)}.${note}`, stays: Boolean(note) });
+    const undo = execution ? {} : { action: "Undo", act: () => takeBack(imported) };
+    emit("toast", { text: `${name} was opened${use}: ${describe(imported?.labels)}.${note}`, stays: Boolean(note), ...undo });
   });
 }
