@@ -1,4 +1,4 @@
-// A line over the page: what happened, what went wrong and what to do, perhaps with a way back.
+// A line at the foot of the page: what happened, what went wrong and what to do, perhaps with a way back.
 
 import { on } from "./bus.js";
 import { byId, make } from "./dom.js";
