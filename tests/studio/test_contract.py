@@ -4,6 +4,7 @@ import io
 import json
 import struct
 import zipfile
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from studio_page import RunningStudio, points_of
 from probdmp import FailureDetector, PrimitiveLibrary, ProbabilisticDMP, load, read_demonstrations, write_demonstrations
 from probdmp.demonstrations import FAULTS, LETTERS, synthetic_letters
 from probdmp.dmp import task_for
+from probdmp.estimator import load_detector
 from probdmp.execution import planned_recording
 from probdmp.plotting.trajectories import band_edges
 from probdmp.studio.jobs import Contents
@@ -179,6 +181,19 @@ def test_a_held_pen_is_caught(taught):
     taught.ask("pointer", "verdict", "played", mode="none")
 
 
+def test_the_cause_is_told_as_soon_as_it_is_known(taught):
+    """It is looked into for some ticks after the alarm, while the pen is still held."""
+    taught.ask("play", "playing", speed=0.5)
+    x, y = rows_of(taught.watch(20)[-1])[1][0].tolist()
+    taught.say("pointer", mode="hold", x=x, y=y)
+    told = taught.hear("verdict", where=lambda verdict: verdict["cause"] == "held")
+    assert "final" not in told
+    taught.watch(20)  # each a tick or more: until then it is looked into
+    taught.say("pointer", mode="none")
+    final = taught.hear("verdict", where=lambda verdict: verdict.get("final"))
+    assert (final["cause"], final["time"]) == ("held", told["time"])
+
+
 def test_playing_can_be_stopped(taught):
     taught.ask("play", "playing", speed=0.1)
     assert taught.ask("stop", "played")["completed"] is False
@@ -264,6 +279,96 @@ def test_files_are_opened(page, taught_model, tmp_path):
     page.ask("select", "state", label="s")
     assert page.ask("play", "playing", "error", fault="hold")["type"] == "playing"
     assert page.hear("verdict", where=lambda verdict: verdict.get("final"))["failed"]
+
+
+@pytest.fixture(scope="module")
+def of_a_robot():
+    """Ten recordings in millimetres, far from the canvas, with names of their own."""
+    letters = synthetic_letters(10, letters="c", dt=0.01)
+    around = {"names": ("x", "y"), "units": "mm"}
+    return [replace(d, positions=20 * d.positions + np.array([400.0, -150.0]), **around) for d in letters]
+
+
+def test_what_comes_in_millimetres_is_saved_in_millimetres(page, of_a_robot, tmp_path):
+    write_demonstrations(tmp_path / "robot.npz", of_a_robot)
+    with page.studio.http() as http:
+        reply = http.post(f"/upload/{page.session}?name=robot.npz", content=(tmp_path / "robot.npz").read_bytes())
+        assert "to fit the canvas; kept and saved in its own unit" in reply.json()["imported"]["note"]
+        state = page.hear("state", where=lambda state: state["calibration"] and state["calibration"]["n"])
+        band = page.ask("select", "band", label="c")
+        for name in ("demonstrations.csv", "model.probdmp"):
+            (tmp_path / name).write_bytes(http.get(f"/download/{page.session}/{name}").content)
+    saved = read_demonstrations(tmp_path / "demonstrations.csv")
+    assert {(d.units, d.names) for d in saved} == {("mm", ("x", "y"))}
+    np.testing.assert_allclose(saved[3].positions, of_a_robot[3].positions, rtol=1e-12)
+    verdicts = load_detector(tmp_path / "model.probdmp").verdicts(of_a_robot)
+    assert not any(verdict.failed for verdict in verdicts)
+    (label,) = state["labels"]
+    assert (band["units"], label["origin"]["units"]) == ("mm", "mm")
+    shown = label["origin"]["scale"] * np.array(band["path"]["mean"]) + label["origin"]["shift"]
+    assert np.all((shown > 0) & (shown < [100, 75]))
+
+
+def test_strokes_in_millimetres_are_taught_again_as_such(studio, page, of_a_robot, tmp_path):
+    write_demonstrations(tmp_path / "robot.npz", of_a_robot)
+    with page.studio.http() as http:
+        http.post(f"/upload/{page.session}?name=robot.npz", content=(tmp_path / "robot.npz").read_bytes())
+    (label,) = page.hear("state", where=lambda state: state["labels"])["labels"]
+    with studio.page() as other:
+        points = label["strokes"][0]["points"]
+        band = other.ask("stroke", "band", "error", label="c", points=[[*row, None] for row in points], origin=label["origin"])
+        assert band["units"] == "mm"
+        assert other.state()["labels"][0]["origin"] == label["origin"]
+        error = other.ask("stroke", label="c", points=points_of(of_a_robot[0]), origin=label["origin"] | {"units": "m"})
+        assert (error["expected"], error["got"]) == ("recordings of 'c' as those that are there, x, y in mm", "x, y in m")
+        assert "canvas" in other.ask("example", "error", name="c")["got"]
+        for broken in ({}, label["origin"] | {"scale": 0}, label["origin"] | {"shift": [1e300, 0]}, {"names": [1, 2]}):
+            other.ask("stroke", "error", label="d", points=points_of(of_a_robot[0]), origin=broken)
+
+
+def test_a_file_whose_unit_is_another_than_the_letters_is_not_taken_in_part(page, drawn, of_a_robot, tmp_path):
+    page.ask("stroke", "band", label="z", points=points_of(drawn[0]))
+    write_demonstrations(tmp_path / "robot.npz", [of_a_robot[0], replace(of_a_robot[1], label="z")])
+    with page.studio.http() as http:
+        reply = http.post(f"/upload/{page.session}?name=robot.npz", content=(tmp_path / "robot.npz").read_bytes())
+    assert reply.status_code == 400
+    assert reply.json()["error"]["expected"] == "recordings of 'z' as those that are there, x, y in units of the canvas"
+    assert [(one["name"], len(one["strokes"])) for one in page.state()["labels"]] == [("z", 1)]
+
+
+def test_letters_of_several_units_are_saved_in_several_files(page, drawn, of_a_robot, tmp_path):
+    page.ask("stroke", "band", label="drawn", points=points_of(drawn[0]))
+    write_demonstrations(tmp_path / "robot.npz", of_a_robot)
+    with page.studio.http() as http:
+        http.post(f"/upload/{page.session}?name=robot.npz", content=(tmp_path / "robot.npz").read_bytes())
+        refused = http.get(f"/download/{page.session}/demonstrations.npz")
+        assert (refused.status_code, "session.zip" in refused.json()["error"]["hint"]) == (409, True)
+        archive = zipfile.ZipFile(io.BytesIO(http.get(f"/download/{page.session}/session.zip").content))
+    archive.extractall(tmp_path / "all")
+    parts = [read_demonstrations(tmp_path / "all" / name) for name in ("demonstrations.npz", "demonstrations-2.npz")]
+    assert [(len(part), part[0].units) for part in parts] == [(1, ""), (10, "mm")]
+
+
+def test_without_matplotlib_a_session_is_saved_without_pictures(taught, monkeypatch):
+    monkeypatch.setattr("probdmp.plotting.style.find_spec", lambda name: None)
+    assert taught.state()["pictures_missing"] == "Type: pip install 'probdmp[plot]'"
+    with taught.studio.http() as http:
+        reply = http.get(f"/download/{taught.session}/session.zip")
+    inside = set(zipfile.ZipFile(io.BytesIO(reply.content)).namelist())
+    assert inside == {"demonstrations.npz", "demonstrations.csv", "model.probdmp", "commands.txt"}
+
+
+def test_an_opened_model_is_shown_at_once(page, of_a_robot, tmp_path):
+    learned = ProbabilisticDMP(n_basis=10).fit(of_a_robot)
+    PrimitiveLibrary({"c": learned}).save(tmp_path / "m.probdmp", FailureDetector().fit({"c": learned}, {"c": of_a_robot}))
+    with page.studio.http() as http:
+        reply = http.post(f"/upload/{page.session}?name=m.probdmp", content=(tmp_path / "m.probdmp").read_bytes())
+        assert reply.json()["imported"]["labels"] == {"c": 0}
+    band = page.hear("band")
+    assert (band["label"], band["units"]) == ("c", "mm")
+    state = page.state()
+    assert state["selected"] == "c"
+    assert state["labels"][0]["origin"]["scale"] != 1
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,17 @@ from probdmp.demonstrations import FAULTS
 from probdmp.errors import InputError, InputTypeError
 from probdmp.execution import DISTURBANCES
 from probdmp.studio.commands import commands_of
-from probdmp.studio.fields import choice_of, name_of, number_of, optional_name_of, optional_point_of, place_of, points_of
+from probdmp.studio.fields import (
+    FARTHEST,
+    choice_of,
+    name_of,
+    number_of,
+    optional_name_of,
+    optional_point_of,
+    place_of,
+    points_of,
+)
+from probdmp.studio.origins import DRAWN, origin_in
 from probdmp.studio.room import Room
 from probdmp.studio.session import TaskWish
 from probdmp.studio.strokes import EXAMPLES, example_strokes, stroke_of
@@ -48,13 +58,13 @@ async def _hello(room: Room, message: Message) -> None:
 
 async def _stroke(room: Room, message: Message) -> None:
     label = name_of(message)
-    room.session.add_strokes(label, [stroke_of(points_of(message, least=3), label)])
+    room.session.add_strokes(label, [stroke_of(points_of(message, least=3), label)], origin_in(message))
     _taught(room, label)
 
 
 async def _example(room: Room, message: Message) -> None:
     label = choice_of(message, "name", EXAMPLES)
-    room.session.add_strokes(label, await room.workers.run(example_strokes, label))
+    room.session.add_strokes(label, await room.workers.run(example_strokes, label), DRAWN)
     _taught(room, label)
 
 
@@ -141,7 +151,7 @@ async def _pointer(room: Room, message: Message) -> None:
     mode = check_choice(message.get("mode"), "mode", DISTURBANCES)
     point: tuple[float, float] | None = None
     if mode in ("hold", "push"):
-        point = (number_of(message, "x", -1e4, 1e4), number_of(message, "y", -1e4, 1e4))
+        point = (number_of(message, "x", -FARTHEST, FARTHEST), number_of(message, "y", -FARTHEST, FARTHEST))
     if room.playing is not None:
         room.playing.pen.disturb(mode, point)
 

@@ -49,6 +49,8 @@ def band_view(label: str, movement: Movement, wish: TaskWish) -> dict[str, Any]:
         {
             "type": "band",
             "label": label,
+            "names": primitive.names,
+            "units": primitive.units,
             "times": planned.times[chosen],
             **bands,
             "channels": channels,

@@ -24,6 +24,8 @@ def _shell(session: Session) -> list[str]:
     options += ["--false-alarm-rate", f"{settings.alpha:g}"]
     lines = [f"probdmp fit demonstrations.npz -o model.probdmp {' '.join(options)}"]
     lines.append(" ".join(["probdmp rollout model.probdmp", "--label", quote(label), *_task_options(session)]))
+    if session.task.via:
+        lines.append("# The command line has no via-points: the code in Python goes through them.")
     lines.append(f"probdmp plot path model.probdmp --label {quote(label)} -o picture.svg")
     lines.append(f"probdmp monitor model.probdmp demonstrations.npz --label {quote(label)}")
     return lines

@@ -12,8 +12,8 @@ from probdmp.studio.limits import LONGEST_NAME, MOST_POINTS
 
 __all__ = ["FARTHEST", "choice_of", "name_of", "number_of", "optional_name_of", "optional_point_of", "place_of", "points_of"]
 
-FARTHEST = 1e4
-"""Units from the corner of the canvas: a hundred canvases away."""
+FARTHEST = 1e7
+"""Units, in whichever a movement is kept."""
 
 
 def name_of(message: Mapping[str, Any], field: str = "label") -> str:
@@ -70,7 +70,7 @@ def points_of(message: Mapping[str, Any], field: str = "points", columns: int = 
 
 
 def _table(rows: list[Any], field: str, columns: int) -> FloatArray:
-    """Numbers that are finite and near the canvas."""
+    """Numbers that are finite and not absurd."""
     wanted = f"{field} of {columns} numbers each"
     for row in rows:
         if not isinstance(row, list) or len(row) != columns:

@@ -4,13 +4,13 @@ import io
 import os
 import zipfile
 from collections import Counter
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path, PurePath
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
-from probdmp.demonstrations import Demonstration, are_within, placement_within
+from probdmp.demonstrations import Demonstration
 from probdmp.errors import DataFileError, InputError
 from probdmp.estimator import ProbabilisticDMP
 from probdmp.evaluation import group_by_label
@@ -18,8 +18,10 @@ from probdmp.io.formats import FORMATS
 from probdmp.studio import jobs
 from probdmp.studio.commands import commands_of
 from probdmp.studio.fields import name_of
-from probdmp.studio.limits import CANVAS, LARGEST_UPLOAD, LONGEST_NAME, LONGEST_STROKE
+from probdmp.studio.limits import DT, IMPORTED, LARGEST_UPLOAD, LONGEST_NAME, LONGEST_STROKE
+from probdmp.studio.origins import origin_of
 from probdmp.studio.room import Room
+from probdmp.studio.views import pictures_missing
 
 __all__ = ["DOWNLOADS", "Import", "add_contents", "add_file", "download", "received"]
 
@@ -58,7 +60,9 @@ class Import(NamedTuple):
     labels: dict[str, int]
     """Recordings of each label; 0 for a movement that came without any."""
     note: str
-    """What was done to them, if anything."""
+    """How they are shown, if not as they are."""
+    first: dict[str, int]
+    """Place of the first one among the recordings of each label, or among the executions."""
 
 
 async def add_file(room: Room, name: str, body: bytes, as_execution: bool) -> Import:
@@ -76,31 +80,47 @@ async def add_file(room: Room, name: str, body: bytes, as_execution: bool) -> Im
         path = Path(folder) / f"upload{suffix}"  # its own name is the page's, and may be anything
         path.write_bytes(body)
         contents = await room.workers.run_long(jobs.read_file, str(path))
-    return add_contents(room, PurePath(name).stem, contents, as_execution)
+    taken = add_contents(room, PurePath(name).stem, contents, as_execution)
+    for label in contents.library:
+        await room.show_band(_label(label, PurePath(name).stem))
+    return taken
 
 
 def add_contents(room: Room, stem: str, contents: jobs.Contents, as_execution: bool = False) -> Import:
     """Take in what a file holds; recordings without a label are named after the file, by its stem."""
-    session, note = room.session, ""
+    session, origins = room.session, []
     shown = [_shown(d, stem) for d in contents.recordings]
     library = {_label(label, stem): _checked(label, learned) for label, learned in contents.library.items()}
     if as_execution and not shown:
         raise DataFileError("recorded executions to replay", "a model", "Open it to use it instead.")
-    if shown and not as_execution:
-        session.placement = None if are_within(shown, CANVAS) else placement_within(shown, CANVAS)
-    if session.placement is not None:
-        shown = [session.placement.placed(d) for d in shown]
-        note = f"Scaled by {session.placement.scale:.3g} and moved, to fit the canvas."
     if as_execution:
+        first = {IMPORTED: len(session.imported)}
         session.add_imported(shown)
     else:
+        first = {label: session.n_recordings(label) if label in session.movements else 0 for label in _labels(library, shown)}
         detector = contents.detector
-        session.add_movements(library, detector if detector is not None and detector.sensors_ is None else None)
-        for label, members in group_by_label(shown).items():
-            session.add_strokes(label, members)
+        planned = {label: origin_of([_planned(learned)]) for label, learned in library.items()}
+        session.add_movements(library, detector if detector is not None and detector.sensors_ is None else None, planned)
+        origins = [*planned.values(), *([origin_of(shown)] if shown else [])]
+        groups = group_by_label(shown)
+        for label in groups:
+            session.origin_with(label, origins[-1])  # all or none
+        for label, members in groups.items():
+            session.add_strokes(label, members, origins[-1])
         room.learner.learn(*dict.fromkeys(d.label for d in shown))
     room.show_state()
-    return Import(dict.fromkeys(library, 0) | Counter(d.label for d in shown), note)
+    note = next((origin.note for origin in origins if origin.note), "")
+    return Import(_labels(library, shown), note, first)
+
+
+def _labels(library: Mapping[str, ProbabilisticDMP], shown: list[Demonstration]) -> dict[str, int]:
+    return dict.fromkeys(library, 0) | Counter(d.label for d in shown)
+
+
+def _planned(learned: ProbabilisticDMP) -> Demonstration:
+    """Where a movement goes."""
+    planned = learned.rollout(dt=DT)
+    return Demonstration(planned.positions, DT, names=learned.primitive_.names, units=learned.primitive_.units)
 
 
 def _label(label: str, stem: str) -> str:
@@ -113,7 +133,7 @@ def _shown(recording: Demonstration, stem: str) -> Demonstration:
         hint = "The studio shows paths in the plane; probdmp fit and probdmp monitor take any."
         raise DataFileError("recordings of two degrees of freedom", f"{recording.n_dof} ({', '.join(recording.names)})", hint)
     _check_duration(recording.duration)
-    return replace(recording, label=_label(recording.label, stem), names=("x", "y"), units="")
+    return replace(recording, label=_label(recording.label, stem))
 
 
 def _checked(label: str, learned: ProbabilisticDMP) -> ProbabilisticDMP:
@@ -132,21 +152,40 @@ def _check_duration(seconds: float) -> None:
 
 async def download(room: Room, name: str) -> bytes:
     """One of `DOWNLOADS`."""
+    await room.learner.settled()
     if name != "session.zip":
-        return await _written(room, name)
+        return await _written(room, name, _all_strokes(room))
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        for part in DOWNLOADS:
-            if part != name:
-                archive.writestr(part, await _written(room, part))
+        for part, strokes in _parts(room):
+            archive.writestr(part, await _written(room, part, strokes))
         archive.writestr(COMMANDS, "\n\n".join(commands_of(room.session).values()))
     return buffer.getvalue()
 
 
-async def _written(room: Room, name: str) -> bytes:
+def _all_strokes(room: Room) -> list[Demonstration]:
+    return [stroke for strokes in room.session.all_strokes().values() for stroke in strokes]
+
+
+def _parts(room: Room) -> Iterator[tuple[str, list[Demonstration]]]:
+    """What a session consists of: demonstrations in a file for each unit, no pictures where nothing draws them."""
+    by_origin: dict[tuple[tuple[str, ...], str], list[Demonstration]] = {}
+    for stroke in _all_strokes(room):
+        by_origin.setdefault((stroke.names, stroke.units), []).append(stroke)
+    for part in DOWNLOADS:
+        path = PurePath(part)
+        if path.suffix in FORMATS:
+            for k, strokes in enumerate(by_origin.values()):
+                yield (path.name if k == 0 else f"{path.stem}-{k + 1}{path.suffix}"), strokes
+        elif path.suffix == jobs.MODEL or (path.stem == "picture" and not pictures_missing()):
+            yield part, []
+
+
+async def _written(room: Room, name: str, strokes: list[Demonstration]) -> bytes:
     session = room.session
-    await room.learner.settled()
-    strokes = [d for part in session.all_strokes().values() for d in part]
+    if len({(d.names, d.units) for d in strokes}) > 1:
+        hint = "session.zip holds a file for each unit."
+        raise InputError("demonstrations of one unit in one file", "of several", hint)
     with TemporaryDirectory(prefix="probdmp-studio-") as folder:
         path = os.path.join(folder, name)
         arguments = (session.library, strokes, room.shared_detector(), session.selected)

@@ -57,7 +57,7 @@ class Playing:
         self.names = (*primitive.names, *primitive.channel_names)
         noise_stds = np.sqrt(primitive.observation_variances)
         self.pen = SimulatedPen(recording, primitive.channel_names, noise_stds, rng)
-        self._speed, self._due, self._has_alarm = speed, 0.0, False
+        self._speed, self._due, self._said = speed, 0.0, ""
 
     @property
     def is_over(self) -> bool:
@@ -76,8 +76,7 @@ class Playing:
         self._due -= int(self._due)
         return last
 
-    def has_new_alarm(self) -> bool:
-        """Whether there is an alarm that was not asked about yet."""
-        is_new = self.execution.failed and not self._has_alarm
-        self._has_alarm = self.execution.failed
-        return is_new
+    def has_news(self) -> bool:
+        """Whether there is an alarm, and it says something that it did not say when this was asked last."""
+        before, self._said = self._said, str(self.execution.verdict) if self.execution.failed else ""
+        return self._said not in ("", before)

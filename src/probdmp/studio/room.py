@@ -18,6 +18,7 @@ from probdmp.studio.bands import asked_of, band_view
 from probdmp.studio.frames import PLAYING, TRACING, frame_of
 from probdmp.studio.learner import Learner
 from probdmp.studio.limits import DT, FRAME_RATE
+from probdmp.studio.origins import as_executed
 from probdmp.studio.playing import Playing, faulty
 from probdmp.studio.session import Session, TaskWish
 from probdmp.studio.tracing import Tracing
@@ -146,7 +147,7 @@ class Room:
             now = time.perf_counter()
             tick, shown = await asyncio.to_thread(playing.advance, now - shown), now
             self._show_tick(PLAYING, tick)
-            if playing.has_new_alarm():
+            if playing.has_news():
                 self.session.send(views.verdict_view(playing.execution.verdict))
         self.session.send(views.verdict_view(playing.execution.verdict) | {"final": True})
         self.session.send({"type": "played", "completed": True})
@@ -172,7 +173,7 @@ class Room:
         """More of what is drawn."""
         tracing = self._traced()
         self._show_tick(TRACING, await tracing.add(points))
-        if tracing.execution is not None and tracing.has_new_alarm():
+        if tracing.execution is not None and tracing.has_news():
             self.session.send(views.verdict_view(tracing.execution.verdict))
         if self._recognising is None or self._recognising.done():
             self._recognising = asyncio.create_task(self._recognise(tracing, False))
@@ -213,10 +214,12 @@ class Room:
         detector = self.session.detectors.get(name)
         if detector is not None and not any(p.identity == learned.primitive_.identity for p in detector.primitives_.values()):
             detector = None
+        recording = as_executed(recording, learned.primitive_)
         self.session.send(await self.workers.run_long(jobs.judge, name, learned, detector, recording), "replayed")
 
     async def compare(self, label: str, index: int) -> None:
         """Show an execution as recorded, filtered, smoothed."""
         own, recording = self.session.recording(label, index)
         name, learned = await self._ready(own)
+        recording = as_executed(recording, learned.primitive_)
         self.session.send(await self.workers.run_long(jobs.compare, name, learned, recording), "compared")

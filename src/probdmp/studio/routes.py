@@ -88,7 +88,7 @@ class Studio:
             taken = await add_file(room, name, await received(request.stream()), use == "execution")
         except ProbDMPError as error:
             return JSONResponse({"error": error_view(error)}, 400)
-        return JSONResponse({"imported": {"labels": taken.labels, "note": taken.note}})
+        return JSONResponse({"imported": taken._asdict()})
 
     async def download(self, request: "Request") -> "Response":
         """A file of a session."""

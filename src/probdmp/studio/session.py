@@ -5,11 +5,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from probdmp.checks import FloatArray
-from probdmp.demonstrations import Demonstration, Placement
+from probdmp.demonstrations import Demonstration
 from probdmp.detection import FailureDetector
 from probdmp.errors import InputError, UnknownLabelError
 from probdmp.estimator import ProbabilisticDMP
 from probdmp.studio.limits import IMPORTED, MOST_LABELS, MOST_SAMPLES, MOST_STROKES
+from probdmp.studio.origins import DRAWN, Origin
 from probdmp.studio.outbox import Outbox
 from probdmp.studio.settings import Settings
 
@@ -21,6 +22,7 @@ class Movement:
     """A label: its demonstrations and what was learned from them."""
 
     strokes: list[Demonstration] = field(default_factory=list)
+    origin: Origin = DRAWN
     learned: ProbabilisticDMP | None = None
     before: ProbabilisticDMP | None = None
     """What was known before the last change, if anything."""
@@ -64,8 +66,6 @@ class Session:
         self.task = TaskWish()
         self.imported: list[Demonstration] = []
         """Recorded executions to be replayed."""
-        self.placement: Placement | None = None
-        """How recordings from files were put onto the canvas, if they would not have fitted."""
         self.detectors: dict[str, FailureDetector] = {}
         self.calibration_problem = ""
         """Why there are no detectors, if calibrating failed."""
@@ -121,17 +121,33 @@ class Session:
             self.movements[label] = Movement()
         return self.movements[label]
 
-    def add_strokes(self, label: str, strokes: list[Demonstration]) -> None:
-        """Further demonstrations of a label, which is selected."""
+    def add_strokes(self, label: str, strokes: list[Demonstration], origin: Origin | None = None) -> None:
+        """Further demonstrations of a label, which is selected; drawn on the canvas as it is shown there, unless they say."""
         self._check_room(strokes)
         held = len(self.movements[label].strokes) if label in self.movements else 0
         if held + len(strokes) > MOST_STROKES:
             hint = "Delete some, or write what you have to a file and use probdmp fit."
             raise InputError(f"at most {MOST_STROKES} demonstrations of a label", f"{held + len(strokes)}", hint)
+        joined = self.origin_with(label, origin)
         movement = self.add_label(label)
-        movement.strokes.extend(strokes)
+        movement.origin = joined
+        movement.strokes.extend(map(movement.origin.of, strokes))
         movement.version += 1
         self.select(label)
+
+    def origin_with(self, label: str, origin: Origin | None) -> Origin:
+        """Of a label when recordings join it; None: they are drawn where it is shown.
+
+        Raises
+        ------
+        InputError
+            If they cannot.
+        """
+        movement = self.movements.get(label, Movement())
+        if origin is None:
+            return movement.origin
+        is_new = not movement.strokes and movement.learned is None
+        return origin if is_new else movement.origin.joined(origin, label)
 
     def select(self, label: str) -> None:
         """Speak of another movement from now on, executed as learned."""
@@ -150,14 +166,17 @@ class Session:
             raise InputError(f"at most {MOST_STROKES} executions to replay", f"{len(self.imported) + len(executions)}")
         self.imported.extend(executions)
 
-    def add_movements(self, library: Mapping[str, ProbabilisticDMP], detector: FailureDetector | None) -> None:
-        """Movements from a file, without their demonstrations."""
+    def add_movements(
+        self, library: Mapping[str, ProbabilisticDMP], detector: FailureDetector | None, origins: Mapping[str, Origin]
+    ) -> None:
+        """Movements from a file, without their demonstrations, by label."""
         taken = [label for label in library if label in self.movements and self.movements[label].strokes]
         if taken:
             raise InputError("a model whose labels are not taken", ", ".join(map(repr, taken)), "Rename yours first.")
         for label, learned in library.items():
             movement = self.add_label(label)
             movement.learned, movement.before, movement.given_detector = learned, None, detector
+            movement.origin = origins[label]
             self.select(label)
 
     def recording(self, label: str, index: int) -> tuple[str | None, Demonstration]:

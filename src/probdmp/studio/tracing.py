@@ -34,7 +34,7 @@ class Tracing:
         self.execution = None if learned is None else learned.execute(dt=DT, detector=detector)
         self._n_outputs = 2 if self.execution is None else len(self.execution.array.outputs)
         self._resampling, self._rows = LiveResampling(DT), [np.empty((0, 3))]
-        self._has_alarm = False
+        self._said = ""
 
     async def add(self, points: FloatArray) -> tuple[ExecutionStep, FloatArray] | None:
         """The last tick and its readings (S,), if a movement is scored and points, (n, 4), made a tick due."""
@@ -61,8 +61,8 @@ class Tracing:
         rows = np.concatenate(self._rows)
         return Demonstration(rows[:, :2], DT) if len(rows) >= SHORTEST_RECORDING else None
 
-    def has_new_alarm(self) -> bool:
-        """Whether there is an alarm that was not asked about yet."""
-        failed = self.execution is not None and self.execution.failed
-        is_new, self._has_alarm = failed and not self._has_alarm, failed
-        return is_new
+    def has_news(self) -> bool:
+        """Whether there is an alarm, and it says something that it did not say when this was asked last."""
+        is_alarm = self.execution is not None and self.execution.failed
+        before, self._said = self._said, str(self.execution.verdict) if self.execution is not None and is_alarm else ""
+        return self._said not in ("", before)

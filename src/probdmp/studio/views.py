@@ -8,9 +8,10 @@ from probdmp import __version__
 from probdmp.demonstrations import FAULTS, Demonstration
 from probdmp.detection import Verdict
 from probdmp.detection.calibration_facts import CalibrationFacts
-from probdmp.errors import ProbDMPError
+from probdmp.errors import MissingExtraError, ProbDMPError
 from probdmp.execution import Judgement
 from probdmp.io.plain_values import plain
+from probdmp.plotting.style import require_matplotlib
 from probdmp.plotting.trajectories import evenly_spaced
 from probdmp.studio.commands import commands_of
 from probdmp.studio.limits import SIMULATED
@@ -18,7 +19,7 @@ from probdmp.studio.session import Session, TaskWish
 from probdmp.studio.settings import CHOICES, PRESSURE
 from probdmp.studio.strokes import EXAMPLES
 
-__all__ = ["calibration_view", "error_view", "state_view", "stroke_view", "task_view", "verdict_view"]
+__all__ = ["calibration_view", "error_view", "pictures_missing", "state_view", "stroke_view", "task_view", "verdict_view"]
 
 MOST_SHOWN = 200
 """Points of a stroke that are shown."""
@@ -37,7 +38,12 @@ def state_view(session: Session) -> dict[str, Any]:
             "session": session.name,
             "version": __version__,
             "labels": [
-                {"name": name, "strokes": [stroke_view(s) for s in m.strokes], "learned": m.learned is not None}
+                {
+                    "name": name,
+                    "strokes": [stroke_view(s) for s in m.strokes],
+                    "learned": m.learned is not None,
+                    "origin": m.origin.as_dict(),
+                }
                 for name, m in session.movements.items()
             ],
             "selected": session.selected,
@@ -45,12 +51,22 @@ def state_view(session: Session) -> dict[str, Any]:
             "choices": CHOICES,
             "examples": list(EXAMPLES),
             "faults": list(FAULTS),
+            "pictures_missing": pictures_missing(),
             "imported": [{"name": f"execution {k + 1}", "label": d.label} for k, d in enumerate(session.imported)],
             "calibration": calibration_view(session),
             "task": task_view(session.task),
             "commands": commands_of(session),
         }
     )
+
+
+def pictures_missing() -> str:
+    """What to type before there are pictures; empty if there are."""
+    try:
+        require_matplotlib()
+    except MissingExtraError as error:
+        return error.hint
+    return ""
 
 
 def stroke_view(stroke: Demonstration) -> dict[str, Any]:

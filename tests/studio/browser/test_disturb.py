@@ -13,7 +13,7 @@ LATENCY = 0.25
 
 
 MIDDLE, CORNER = (350.0, 250.0), (80.0, 80.0)
-"""Of the canvas, pixels; not at its edge, for it moves a little when the hint above it grows."""
+"""Of the canvas, pixels."""
 KEEP_FRAMES = "window.seen = []; studio.on('frame', (frame) => seen.push([frame.time, ...frame.measured]))"
 
 
@@ -33,7 +33,9 @@ def test_a_held_pen_is_noticed_in_time(studio: Studio) -> None:
     verdict = studio.wait_for_verdict("failed")
     studio.until(f"seen.at(-1)[0] > {float(verdict['time']) + 0.03}")
     frames = np.array(page.evaluate("seen"))
+    studio.lists("#hint", "It noticed. Let go.")
     page.mouse.up()
+    studio.lists("#hint", "It noticed. Let it arrive, or stop it.")
     held, noticed = held_since(frames), float(verdict["time"])
     assert 0 < held < noticed
     assert noticed - held <= LATENCY * float(page.input_value("#duration")), (held, verdict)
@@ -130,6 +132,9 @@ def test_a_via_point_is_added_timed_and_removed(studio: Studio) -> None:
     page.get_by_label("When it passes via-point 1").focus()
     page.keyboard.press("ArrowRight")
     studio.lists(".via output", "52 %")
+    page.click("#open-commands")
+    studio.says("#commands-shell", "The command line has no via-points")
+    page.keyboard.press("Escape")
     page.get_by_role("button", name="Remove via-point 1").click()
     studio.counts("[data-key=via-0]", 0)
 

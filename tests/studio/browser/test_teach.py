@@ -4,7 +4,7 @@ from studio_browser import Studio, line
 
 
 def test_a_letter_drawn_three_times_has_a_band(studio: Studio) -> None:
-    studio.says("#hint", "Draw an a, three times.")
+    studio.says("#hint", "Draw an a, in one stroke, three times.")
     studio.teach(strokes=2)
     studio.draw(shift=1)
     studio.says(".count", "3 strokes, learned")
@@ -13,6 +13,13 @@ def test_a_letter_drawn_three_times_has_a_band(studio: Studio) -> None:
     studio.becomes("document.getElementById('paper').getAttribute('aria-label')", described)
     studio.counts("#strokes svg polyline", 3)
     studio.says("#change", "the third demonstration")
+
+
+def test_the_canvas_stays_where_it_is_whatever_the_hint(studio: Studio) -> None:
+    place, hint = "document.getElementById('board').getBoundingClientRect().y", "document.getElementById('hint').textContent"
+    studio.says("#hint", "in one stroke")
+    before = studio.page.evaluate(f"{hint} = 'Short.'; {place}")
+    assert studio.page.evaluate(f"{hint} = 'A sentence of two lines, '.repeat(4); {place}") == before
 
 
 def test_hints_count_the_strokes(studio: Studio) -> None:

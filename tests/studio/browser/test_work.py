@@ -2,13 +2,22 @@
 
 import base64
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from studio_browser import Studio
 
-from probdmp import read_demonstrations, synthetic_letters, write_demonstrations
+from probdmp import (
+    FailureDetector,
+    PrimitiveLibrary,
+    ProbabilisticDMP,
+    read_demonstrations,
+    synthetic_letters,
+    write_demonstrations,
+)
 
 
 def drop(studio: Studio, path: Path) -> None:
@@ -35,7 +44,7 @@ def letters(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_file_that_is_dropped_is_learned(studio: Studio, letters: Path) -> None:
     drop(studio, letters)
-    studio.says("#toast", r"letters\.npz was opened: b \(4\), c \(4\)")
+    studio.says("#toast", r"letters\.npz was opened as demonstrations: b \(4\), c \(4\)")
     studio.lists("#labels .name", "b", "c")
     studio.hides("#dropzone")
     studio.lists(".count", "4 strokes, learned", "4 strokes, learned")
@@ -47,6 +56,111 @@ def test_a_file_that_is_not_understood_says_so(studio: Studio, tmp_path: Path) -
         drop(studio, tmp_path / "letters.npz")
     studio.says("#toast", "Expected")
     studio.complaints[:] = [text for text in studio.complaints if "Failed to load resource" not in text]  # the 4xx itself
+
+
+@pytest.fixture(scope="module")
+def in_millimetres(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Recordings of a robot, far from the canvas, and a model of them beside."""
+    path = tmp_path_factory.mktemp("robot") / "robot.npz"
+    letters = synthetic_letters(4, letters="c", dt=0.01)
+    around = [replace(d, positions=20 * d.positions + np.array([400.0, -150.0]), units="mm") for d in letters]
+    write_demonstrations(path, around)
+    learned = ProbabilisticDMP(n_basis=15).fit(around)
+    PrimitiveLibrary({"c": learned}).save(path.with_suffix(".probdmp"), FailureDetector().fit({"c": learned}, {"c": around}))
+    return path
+
+
+def save(studio: Studio, name: str, folder: Path) -> Path:
+    studio.page.click("#open-files")
+    with studio.page.expect_download() as saved:
+        studio.page.get_by_role("link", name=name, exact=True).click()
+    studio.page.keyboard.press("Escape")
+    saved.value.save_as(folder / name)
+    return folder / name
+
+
+def test_millimetres_are_shown_on_the_canvas_and_saved_as_they_were(
+    studio: Studio, in_millimetres: Path, tmp_path: Path
+) -> None:
+    """Strokes drawn to them are in millimetres, too, and so are those that are taken back."""
+    drop(studio, in_millimetres)
+    studio.says(
+        "#toast",
+        r"robot\.npz was opened as demonstrations: c \(4\)\. Shown .* kept and saved in its own",
+    )
+    studio.says("#charts figcaption", r"^Position x \[mm\]")
+    studio.draw()
+    studio.counts("#strokes li", 5)
+    studio.page.get_by_role("button", name="Delete stroke 1 of c").click()
+    studio.counts("#strokes li", 4)
+    studio.page.get_by_role("button", name="Undo").click()
+    studio.lists(".count", "5 strokes, learned")
+    before, after = read_demonstrations(in_millimetres), read_demonstrations(save(studio, "demonstrations.npz", tmp_path))
+    assert {d.units for d in after} == {"mm"}
+    np.testing.assert_allclose(after[0].positions, before[1].positions, rtol=1e-12)
+    np.testing.assert_allclose(after[4].positions, before[0].positions, rtol=1e-4)
+    around = np.concatenate([d.positions for d in before])
+    assert np.linalg.norm(after[3].positions.mean(axis=0) - around.mean(axis=0)) < np.ptp(around, axis=0).max()
+
+
+def test_an_opened_model_is_ready_to_be_played_and_held(studio: Studio, in_millimetres: Path) -> None:
+    page = studio.page
+    drop(studio, in_millimetres.with_suffix(".probdmp"))
+    studio.says("#toast", r"robot\.probdmp was opened: c \(learned\)")
+    studio.lists("#hint", "It knows the movement. Press Play.")
+    studio.lists(".count", "learned from a file")
+    studio.says("#charts figcaption", r"^Position x \[mm\]")
+    studio.shows("#teach-play:enabled")
+    studio.says("#calibration-text", "Calibrated on 4 ")
+    studio.play("#teach-play", 0.2, at=(350.0, 250.0))
+    page.mouse.down()
+    assert "Something is wrong" in studio.wait_for_verdict("failed")["text"]
+    page.mouse.up()
+    page.click("#play")
+    start = page.get_by_role("button", name="Start at")
+    box, board = start.bounding_box(), page.locator("#board").bounding_box()
+    assert board["x"] < box["x"] < board["x"] + board["width"]
+    assert board["y"] < box["y"] < board["y"] + board["height"]
+
+
+def test_a_download_that_fails_says_so(studio: Studio) -> None:
+    studio.page.click("#open-files")
+    studio.page.get_by_role("link", name="model.probdmp").click()
+    studio.says("#toast", "Expected a movement that was learned, got none")
+    studio.complaints[:] = [text for text in studio.complaints if "Failed to load resource" not in text]  # the 409 itself
+
+
+def test_pictures_that_nothing_draws_are_no_links(studio: Studio) -> None:
+    """As the server says it where matplotlib is not installed."""
+    hint = "Type: pip install 'probdmp[plot]'"
+    studio.use_example()
+    studio.page.evaluate("text => studio.on('state', (state) => (state.pictures_missing = text))", hint)
+    studio.page.click("#add-example button")
+    studio.lists(".count", "20 strokes, learned")
+    studio.page.click("#open-files")
+    studio.counts("#downloads a[href]", 4)
+    studio.lists("#downloads a[aria-disabled]", "picture.svg", "picture.png")
+    studio.says("#downloads", "pip install")
+
+
+def test_what_a_drop_has_taught_is_taken_back(studio: Studio, letters: Path) -> None:
+    for count in (4, 8):
+        drop(studio, letters)
+        studio.lists(".count", *[f"{count} strokes, learned"] * 2)
+    studio.page.get_by_role("button", name="Undo").click()
+    studio.lists(".count", *["4 strokes, learned"] * 2)
+
+
+def test_an_execution_that_is_dropped_is_the_one_to_replay(studio: Studio, letters: Path) -> None:
+    studio.use_example()
+    studio.mode("Replay")
+    studio.page.select_option("#recording", index=2)
+    drop(studio, letters)
+    studio.says("#toast", r"was opened as executions to replay: b \(4\), c \(4\)")
+    chosen = "document.getElementById('recording').selectedOptions[0].textContent"
+    studio.becomes(chosen, "execution 1: b")
+    drop(studio, letters)
+    studio.becomes(chosen, "execution 9: b")
 
 
 def test_a_recording_is_replayed_and_scrubbed(studio: Studio) -> None:

@@ -7,11 +7,10 @@ import { byId, make } from "./dom.js";
 import { band } from "./session.js";
 import { tab } from "./tabs.js";
 
-const AXES = ["x", "y"];
 const TITLES = {
-  position: (name) => `Position ${name} [units] over time [s]`,
-  velocity: (name) => `Velocity ${name} [units/s] over time [s]`,
-  acceleration: (name) => `Acceleration ${name} [units/s²] over time [s]`,
+  position: (name, units) => `Position ${name} [${units}] over time [s]`,
+  velocity: (name, units) => `Velocity ${name} [${units}/s] over time [s]`,
+  acceleration: (name, units) => `Acceleration ${name} [${units}/s²] over time [s]`,
   forcing: (name) => `Forcing term ${name} over the phase`,
 };
 const LINES = [
@@ -21,6 +20,7 @@ const LINES = [
 ];
 
 let charts = [];
+let titles = ""; // of the charts that are shown
 let shownTab = null;
 
 /** As many lines as LINES, of one degree of freedom, or of a channel that has but one. */
@@ -31,7 +31,7 @@ function panels(shown) {
   const of = tab === "position" ? shown.path : shown[tab];
   const across = tab === "forcing" ? of.phase : shown.times;
   const order = across[0] > across.at(-1) ? (values) => [...values].reverse() : (values) => values; // a phase that decays
-  const axes = of.mean[0].map((_, d) => [TITLES[tab](AXES[d]), lines(of, d)]);
+  const axes = of.mean[0].map((_, d) => [TITLES[tab](shown.names[d], shown.units || "units"), lines(of, d)]);
   const felt = tab === "position" ? Object.entries(shown.channels ?? {}) : [];
   const channels = felt.map(([name, one]) => [`${name} over time [s]`, lines(one)]);
   return [...axes, ...channels].map(([title, drawn]) => ({ title, data: [across, ...drawn].map(order) }));
@@ -59,10 +59,12 @@ function draw() {
     return;
   }
   const wanted = panels(shown);
-  if (charts.length !== wanted.length) {
+  const wantedTitles = JSON.stringify(wanted.map(({ title }) => title));
+  if (titles !== wantedTitles || charts.length !== wanted.length) {
     clear();
     byId("charts").replaceChildren();
     charts = wanted.map(({ title }) => makeChart(byId("charts"), { title, series: LINES, between: [2, 1] }));
+    titles = wantedTitles;
   }
   wanted.forEach(({ data }, k) => charts[k].set(data));
 }

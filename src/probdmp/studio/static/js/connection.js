@@ -17,8 +17,8 @@ function show(text, action, act) {
 }
 
 function teachAgain(state) {
-  for (const { name, strokes } of state.labels) {
-    for (const { points } of strokes) send("stroke", { label: name, points: again(points) });
+  for (const { name, strokes, origin } of state.labels) {
+    for (const { points } of strokes) send("stroke", { label: name, points: again(points), origin });
   }
   if (state.selected) send("select", { label: state.selected });
 }

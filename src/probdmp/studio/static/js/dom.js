@@ -32,16 +32,16 @@ export function setText(element, text) {
 
 const SVG = "http://www.w3.org/2000/svg";
 
-/** A stroke as a small picture; points are (t, x, y) in canvas units. */
-export function thumbnail(points) {
+/** A stroke as a small picture; places are (x, y) in canvas units. */
+export function thumbnail(places) {
   const svg = document.createElementNS(SVG, "svg");
-  const [xs, ys] = [points.map(([, x]) => x), points.map(([, , y]) => 75 - y)];
+  const [xs, ys] = [places.map(([x]) => x), places.map(([, y]) => 75 - y)];
   const [left, top] = [Math.min(...xs) - 3, Math.min(...ys) - 3];
   svg.setAttribute("viewBox", `${left} ${top} ${Math.max(...xs) + 3 - left} ${Math.max(...ys) + 3 - top}`);
   svg.setAttribute("aria-hidden", "true");
   const line = document.createElementNS(SVG, "polyline");
   line.setAttribute("vector-effect", "non-scaling-stroke");
-  line.setAttribute("points", points.map(([, x, y]) => `${x},${75 - y}`).join(" "));
+  line.setAttribute("points", places.map(([x, y]) => `${x},${75 - y}`).join(" "));
   svg.append(line);
   return svg;
 }

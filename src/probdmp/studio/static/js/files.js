@@ -2,16 +2,18 @@
 
 import { emit, on } from "./bus.js";
 import { byId, make } from "./dom.js";
-import { session } from "./session.js";
+import { session, strokesOf } from "./session.js";
+import { send } from "./socket.js";
 
 const LARGEST = 64 * 1024 * 1024;
+const FETCHED = 60000; // ms after which a file that was saved is surely on its way to the disk
 const DOWNLOADS = [
-  ["demonstrations.npz", "demonstrations, as probdmp and NumPy read them"],
+  ["demonstrations.npz", "demonstrations, as probdmp and NumPy read them; those from files in their own unit and place"],
   ["demonstrations.csv", "demonstrations, for spreadsheets"],
   ["model.probdmp", "what was learned, with its failure detector"],
   ["picture.svg", "the band as a picture that scales"],
   ["picture.png", "the band as a picture"],
-  ["session.zip", "all of these, with the commands"],
+  ["session.zip", "all of these that there are, with the commands"],
 ];
 
 async function upload(file, execution) {
@@ -34,7 +36,40 @@ async function openAll(files, execution) {
   for (const file of files) await upload(file, execution);
 }
 
-const describe = (labels) => Object.entries(labels ?? {}).map(([name, count]) => `${name} (${count})`).join(", ");
+const describe = (labels) => Object.entries(labels ?? {}).map(([name, count]) => `${name} (${count || "learned"})`).join(", ");
+
+/** Saves a file; what the server says against it is shown, which a plain link would hide. */
+async function download(name) {
+  try {
+    const reply = await fetch(`/download/${session.id}/${name}`);
+    if (!reply.ok) throw (await reply.json()).error;
+    const link = make("a", { href: URL.createObjectURL(await reply.blob()), download: name });
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), FETCHED);
+  } catch (error) {
+    byId("files").close(); // it would cover what is said
+    const lost = { expected: "an answer of the server", got: "none", hint: `${name} was not saved: is the server still running?` };
+    emit("error", error.expected ? error : lost);
+  }
+}
+
+function saved([name, what]) {
+  const missing = name.startsWith("picture") ? session.state.pictures_missing : "";
+  const link = make("a", missing ? { role: "link", "aria-disabled": "true", text: name } : { href: `/download/${session.id}/${name}`, download: name, text: name });
+  link.addEventListener("click", (event) => {
+    event.preventDefault();
+    if (!missing) download(name);
+  });
+  return make("li", {}, link, ` ${what}${missing && `. ${missing}`}`);
+}
+
+/** Forgets what came from a file: recordings, and letters that there were none of before. */
+function takeBack({ labels, first }) {
+  for (const [label, count] of Object.entries(labels)) {
+    if (first[label] === 0 && strokesOf(label).length === count) send("delete_label", { label });
+    else for (let k = first[label] + count - 1; k >= first[label]; k -= 1) send("delete_stroke", { label, index: k });
+  }
+}
 
 function startDropping() {
   const zone = byId("dropzone");
@@ -68,12 +103,14 @@ export function startFiles() {
     });
   }
   byId("open-files").addEventListener("click", () => {
-    const links = DOWNLOADS.map(([name, what]) => make("li", {},
-      make("a", { href: `/download/${session.id}/${name}`, download: name, text: name }), ` ${what}`));
-    byId("downloads").replaceChildren(...links);
+    byId("downloads").replaceChildren(...DOWNLOADS.map(saved));
     byId("files").showModal();
   });
   on("uploaded", ({ name, execution, imported }) => {
-    emit("toast", { text: `${name} was opened: ${describe(imported?.labels)}${execution ? ", to replay" : ""}.` });
+    const note = imported?.note ? ` ${imported.note}` : "";
+    const taught = Object.values(imported?.labels ?? {}).some(Boolean);
+    const use = execution ? " as executions to replay" : taught ? " as demonstrations" : "";
+    const undo = execution ? {} : { action: "Undo", act: () => takeBack(imported) };
+    emit("toast", { text: `${name} was opened${use}: ${describe(imported?.labels)}.${note}`, stays: Boolean(note), ...undo });
   });
 }

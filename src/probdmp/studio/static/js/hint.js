@@ -9,6 +9,7 @@ const ENOUGH = 3;
 let outcome = null; // of the last execution: "failed" or "fine"
 let traced = false;
 let learning = false;
+let held = false; // the pen, by the pointer or the button
 
 /** A single letter is spoken with its article: an a, a b. */
 const withArticle = (name) => (/^[a-z]$/i.test(name) ? `${/[aefhilmnorsx]/i.test(name) ? "an" : "a"} ${name}` : name);
@@ -16,7 +17,8 @@ const withArticle = (name) => (/^[a-z]$/i.test(name) ? `${/[aefhilmnorsx]/i.test
 function teach() {
   const strokes = strokesOf(selected()).length;
   const name = selected();
-  if (!strokes) return `Draw ${withArticle(name)}, three times.`;
+  if (!strokes && band()) return "It knows the movement. Press Play.";
+  if (!strokes) return `Draw ${withArticle(name)}, in one stroke, three times.`;
   if (strokes < ENOUGH) return ENOUGH - strokes === 1 ? "Once more." : "Again, twice more: it learns how you vary.";
   if (!band()) return learning ? "Learning …" : "Draw it once more.";
   return "It knows the movement. Press Play.";
@@ -24,7 +26,8 @@ function teach() {
 
 function play() {
   if (!band()) return "First teach it a letter.";
-  if (session.playing) return outcome === "failed" ? "It noticed. Let go." : "Now press on the canvas and hold the pen while it moves.";
+  if (session.playing && outcome === "failed") return held ? "It noticed. Let go." : "It noticed. Let it arrive, or stop it.";
+  if (session.playing) return "Now press on the canvas and hold the pen while it moves.";
   if (outcome === "failed") return "It noticed. Drag the start or the goal, and play again.";
   if (outcome === "fine") return "That was as taught. Play again, and hold the pen while it moves.";
   return "Press Play.";
@@ -43,9 +46,11 @@ export function startHint() {
   on("learning", () => (learning = true));
   on("band learning_failed", () => (learning = false));
   on("playing", () => (outcome = null));
+  on("held", (message) => (held = message.held));
+  on("playing played", () => (held = false));
   on("traced", () => (traced = true));
   on("verdict", ({ failed, final }) => {
     if (failed || final) outcome = failed ? "failed" : "fine";
   });
-  on("changed mode learning learning_failed playing verdict traced played", update);
+  on("changed mode learning learning_failed playing held verdict traced played", update);
 }

@@ -3,9 +3,9 @@
 import { toUnits } from "./geometry.js";
 
 const SHORTEST = 0.5; // ms: two samples of one time would have no speed
-const MOST = 8000; // points of one message
+const MOST = 6000; // points of one message
 
-/** Digits beyond a tenth of a millisecond and a thousandth of a unit are noise. */
+/** Digits beyond a tenth of a millisecond, and of a pressure, are noise. */
 const rounded = (value, digits) => Number(value.toFixed(digits));
 
 /** Every second point, as often as it takes for a stroke to fit into one message: the server takes a hundred a second. */
@@ -38,7 +38,7 @@ export function followPointer(surface, { begin, move, end }) {
     const previous = points.at(-1);
     const time = (event.timeStamp - first) / 1000;
     if (previous && time < previous[0] + SHORTEST / 1000) return null;
-    const point = [rounded(time, 4), ...toUnits(event, box).map((value) => rounded(value, 3)), pressureOf(event)];
+    const point = [rounded(time, 4), ...toUnits(event, box), pressureOf(event)];
     points.push(point);
     return point;
   };

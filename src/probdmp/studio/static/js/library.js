@@ -2,8 +2,9 @@
 
 import { emit, on } from "./bus.js";
 import { byId, make, setChoices, setText, thumbnail } from "./dom.js";
+import { toCanvas } from "./geometry.js";
 import { again } from "./ink.js";
-import { selected, session, strokesOf } from "./session.js";
+import { originOf, selected, session, strokesOf } from "./session.js";
 import { send } from "./socket.js";
 
 let renaming = null; // the label whose name is being written
@@ -30,7 +31,8 @@ function renameForm(name) {
 function labelRow({ name, strokes, learned }) {
   if (renaming === name) return make("li", {}, renameForm(name));
   const chosen = name === selected();
-  const count = `${strokes.length} stroke${strokes.length === 1 ? "" : "s"}${learned ? ", learned" : ""}`;
+  const taught = `${strokes.length} stroke${strokes.length === 1 ? "" : "s"}${learned ? ", learned" : ""}`;
+  const count = learned && !strokes.length ? "learned from a file" : taught;
   const choose = make("button", { type: "button", class: "label", "aria-pressed": String(chosen), onclick: () => send("select", { label: name }) },
     make("span", { class: "name", text: name }), make("span", { class: "count", text: count }));
   const row = make("li", { "data-label": name }, choose);
@@ -46,17 +48,18 @@ function labelRow({ name, strokes, learned }) {
 }
 
 function deleteLabel(name) {
-  const strokes = strokesOf(name);
+  const [strokes, origin] = [strokesOf(name), originOf(name)];
   send("delete_label", { label: name });
   if (!strokes.length) return;
-  const undo = () => strokes.forEach(({ points }) => send("stroke", { label: name, points: again(points) }));
+  const undo = () => strokes.forEach(({ points }) => send("stroke", { label: name, points: again(points), origin }));
   emit("toast", { text: `${name} is deleted.`, action: "Undo", act: undo });
 }
 
 function deleteStroke(label, index) {
   const { points } = strokesOf(label)[index];
   send("delete_stroke", { label, index });
-  const undo = () => send("stroke", { label, points: again(points) });
+  const origin = originOf(label);
+  const undo = () => send("stroke", { label, points: again(points), origin });
   emit("toast", { text: `Stroke ${index + 1} of ${label} is deleted.`, action: "Undo", act: undo });
 }
 
@@ -69,7 +72,7 @@ function drawStrokes() {
   const strokes = strokesOf(label);
   setText(byId("strokes-title"), strokes.length ? `Strokes of ${label}` : "Strokes");
   byId("strokes").replaceChildren(...strokes.map(({ points, duration }, index) => make("li", {},
-    thumbnail(points),
+    thumbnail(points.map(([, x, y]) => toCanvas([x, y]))),
     make("span", { text: `${duration.toFixed(1)} s` }),
     make("button", { type: "button", class: "remove", text: "×", title: "Delete this stroke", "aria-label": `Delete stroke ${index + 1} of ${label}`,
       onclick: () => deleteStroke(label, index) }))));

@@ -3,7 +3,7 @@
 import { on } from "./bus.js";
 import { colour, onScheme } from "./colours.js";
 import { byId } from "./dom.js";
-import { fitCanvas, HEIGHT, toPixels, WIDTH } from "./geometry.js";
+import { canvasToPixels, fitCanvas, HEIGHT, lengthToPixels, toPixels, WIDTH } from "./geometry.js";
 import { band, selected, session, strokesOf } from "./session.js";
 
 let overlay = null; // recorded, filtered and smoothed, or a replayed path
@@ -34,7 +34,7 @@ export function stroke(context, points, scale, { color, width, dash = [], alpha 
 function drawGrid(context, scale) {
   context.fillStyle = colour("--dot");
   for (let x = 12.5; x < WIDTH; x += 12.5) {
-    for (let y = 12.5; y < HEIGHT; y += 12.5) context.fillRect(...toPixels([x, y], scale), 1.5, 1.5);
+    for (let y = 12.5; y < HEIGHT; y += 12.5) context.fillRect(...canvasToPixels([x, y], scale), 1.5, 1.5);
   }
 }
 
@@ -48,7 +48,7 @@ function drawTube(context, tube, scale) {
     else {
       const [, , rx, ry, angle] = part;
       context.moveTo(x, y);
-      context.ellipse(x, y, rx * scale, ry * scale, -angle, 0, 2 * Math.PI);
+      context.ellipse(x, y, lengthToPixels(rx, scale), lengthToPixels(ry, scale), -angle, 0, 2 * Math.PI);
     }
   }
   context.fillStyle = colour("--tube");
@@ -60,7 +60,7 @@ function drawWish(context, scale) {
   context.save();
   Object.assign(context, { fillStyle: colour("--dot"), globalAlpha: 0.55, textAlign: "center", textBaseline: "middle" });
   context.font = `italic 300 ${46 * scale}px Georgia, "Times New Roman", serif`;
-  context.fillText(selected(), ...toPixels([WIDTH / 2, HEIGHT / 2 + 3], scale), 80 * scale);
+  context.fillText(selected(), ...canvasToPixels([WIDTH / 2, HEIGHT / 2 + 3], scale), 80 * scale);
   context.restore();
 }
 
@@ -74,7 +74,8 @@ function drawEnds(context, mean, scale) {
 }
 
 function describe(shown, strokes) {
-  const taught = `${strokes.length} stroke${strokes.length === 1 ? "" : "s"} of ${selected()}`;
+  const count = `${strokes.length} stroke${strokes.length === 1 ? "" : "s"} of ${selected()}`;
+  const taught = strokes.length ? count : `${selected()}, learned from a file`;
   return shown ? `${taught}; the mean path with its band of two standard deviations` : strokes.length ? taught : "Empty canvas";
 }
 

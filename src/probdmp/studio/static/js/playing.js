@@ -12,6 +12,7 @@ let pull = null; // where the pen is held, or drawn to, while it is disturbed
 let asked = false;
 
 function disturb(at) {
+  if (Boolean(pull) !== Boolean(at)) emit("held", { held: Boolean(at) });
   pull = at;
   show({ pull });
   if (asked) return;

@@ -8,6 +8,7 @@ import { send } from "./socket.js";
 import { pointAt } from "./streams.js";
 
 let replayed = null;
+let opened = null; // place of the first execution that was just opened, until it is chosen
 
 function recordings() {
   const strokes = session.state.labels.flatMap(({ name, strokes, learned }) =>
@@ -15,6 +16,13 @@ function recordings() {
   const imported = session.state.imported.map(({ name, label }, k) =>
     [JSON.stringify({ label, index: k, imported: true }), `${name ?? "opened"}: ${label}`]);
   return [...imported, ...strokes];
+}
+
+function chooseOpened() {
+  const one = session.state.imported[opened];
+  if (!one) return; // the state that has it is on its way
+  byId("recording").value = JSON.stringify({ label: one.label, index: opened, imported: true });
+  opened = null;
 }
 
 /** Asks for the recording that is chosen; its letter is selected, so that the canvas shows what it is compared with. */
@@ -40,6 +48,12 @@ export function startReplay() {
     const all = recordings();
     setChoices(byId("recording"), all.length ? all : [["", "nothing recorded yet"]]);
     byId("replay").disabled = byId("compare").disabled = !all.length;
+    if (opened !== null) chooseOpened();
+  });
+  on("uploaded", ({ execution, imported }) => {
+    if (!execution) return;
+    opened = imported.first.imported;
+    chooseOpened();
   });
   on("replayed", (message) => {
     replayed = message;

@@ -2,11 +2,11 @@
 
 import { on } from "./bus.js";
 import { byId, make, setText } from "./dom.js";
-import { HEIGHT, toUnits, WIDTH } from "./geometry.js";
+import { fromCanvas, HEIGHT, toCanvas, toUnits, WIDTH } from "./geometry.js";
 import { band, selected, session } from "./session.js";
 import { send } from "./socket.js";
 
-const STEP = 1; // units that an arrow key moves; five times as many with Shift
+const STEP = 1; // canvas units that an arrow key moves; five times as many with Shift
 const PATIENCE = 1000; // ms until an answer is given up for lost
 const ARROWS = { ArrowLeft: [-STEP, 0], ArrowRight: [STEP, 0], ArrowUp: [0, STEP], ArrowDown: [0, -STEP] };
 
@@ -32,6 +32,7 @@ function answered() {
 }
 
 const within = ([x, y]) => [Math.min(WIDTH, Math.max(0, x)), Math.min(HEIGHT, Math.max(0, y))];
+const short = (value) => String(Number(value.toPrecision(3)));
 const sampleAt = (path, phase) => path[Math.round(phase * (path.length - 1))];
 
 /** The handles that there are: a key, a name for people, where it is, and what moving or removing it does. */
@@ -47,10 +48,11 @@ function handles() {
   return [...ends, ...via];
 }
 
-function place(button, { name, at: [x, y] }) {
-  button.style.left = `${(x / WIDTH) * 100}%`;
-  button.style.top = `${(1 - y / HEIGHT) * 100}%`;
-  button.setAttribute("aria-label", `${name} at ${x.toFixed(0)}, ${y.toFixed(0)}; arrow keys move it`);
+function place(button, { name, at }) {
+  const [[x, y], [left, bottom]] = [at, toCanvas(at)];
+  button.style.left = `${(left / WIDTH) * 100}%`;
+  button.style.top = `${(1 - bottom / HEIGHT) * 100}%`;
+  button.setAttribute("aria-label", `${name} at ${short(x)}, ${short(y)}; arrow keys move it`);
   button.title = `${name}: drag it, or use the arrow keys`;
 }
 
@@ -59,7 +61,7 @@ const now = (key) => handles().find((one) => one.key === key);
 function makeHandle(key) {
   const button = make("button", { type: "button", class: "handle", "data-key": key });
   const moveTo = (to) => {
-    now(key).move(within(to));
+    now(key).move(fromCanvas(within(to)));
     place(button, now(key));
     sendTask();
   };
@@ -68,7 +70,7 @@ function makeHandle(key) {
     event.stopPropagation();
   });
   button.addEventListener("pointermove", (event) => {
-    if (button.hasPointerCapture(event.pointerId)) moveTo(toUnits(event, byId("board").getBoundingClientRect()));
+    if (button.hasPointerCapture(event.pointerId)) moveTo(toCanvas(toUnits(event, byId("board").getBoundingClientRect())));
   });
   button.addEventListener("keydown", (event) => {
     const by = ARROWS[event.key];
@@ -81,7 +83,7 @@ function makeHandle(key) {
       drawHandles();
       return;
     }
-    const [x, y] = now(key).at;
+    const [x, y] = toCanvas(now(key).at);
     const far = event.shiftKey ? 5 : 1;
     moveTo([x + far * by[0], y + far * by[1]]);
   });

@@ -65,10 +65,12 @@ export function startTeaching() {
     send("example", { name: session.state.examples[0] });
     byId("teach-play").focus();
   });
+  byId("trace-label").addEventListener("change", ({ target: { value } }) => value && value !== selected() && send("select", { label: value }));
   on("changed", () => {
     byId("teach-play").disabled = !band();
-    byId("teach-play").hidden = !session.state.labels.some((one) => one.strokes.length);
-    byId("try-example").hidden = session.state.labels.some((one) => one.strokes.length) || !session.state.examples.length;
+    const isBegun = session.state.labels.some((one) => one.strokes.length || one.learned);
+    byId("teach-play").hidden = !isBegun;
+    byId("try-example").hidden = isBegun || !session.state.examples.length;
     setText(byId("try-example"), `Or take a ready-made ${session.state.examples[0] ?? ""}`);
     setText(byId("change"), band()?.change ?? "");
     const names = session.state.labels.filter((one) => one.learned).map((one) => [one.name, one.name]);
