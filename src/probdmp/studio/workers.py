@@ -3,6 +3,7 @@
 import asyncio
 import os
 import signal
+import threading
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -16,6 +17,8 @@ from probdmp.studio.limits import JOB_SECONDS
 __all__ = ["TooLongError", "Workers"]
 
 Result = TypeVar("Result")
+LONGEST_END = 2.0
+"""Seconds to wait for a process that was ended, in case that it does not."""
 
 
 class TooLongError(InputError):
@@ -48,9 +51,12 @@ class _Worker:
 
     def end(self) -> None:
         """Now, whatever it is doing."""
-        self._executor.shutdown(wait=False, cancel_futures=True)
+        # Its threads have to be gone too: at the end of the program they would be woken, and may just be ending.
+        ending = threading.Thread(target=self._executor.shutdown, kwargs={"cancel_futures": True}, daemon=True)
+        ending.start()
         for process in self._processes:
             process.kill()
+        ending.join(LONGEST_END)
 
 
 class Workers:
