@@ -33,7 +33,7 @@ CAUSES = {
     "`from probdmp import": (
         "some two hundred modules of the library are loaded "
         "(`python -X importtime -c 'from probdmp import ProbabilisticDMP'`); where "
-        " bytecode is not kept (PYTHONDONTWRITEBYTECODE) they are compiled at every start, too"
+        "bytecode is not kept (PYTHONDONTWRITEBYTECODE) they are compiled at every start, too"
     ),
     "fleet": (
         "of one thread (`python benchmarks/fleet_scoring.py 60000 --profile`, on the machine above) 35 % are the windows of "
