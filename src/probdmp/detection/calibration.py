@@ -182,8 +182,6 @@ class Calibration:
 
         count, ordered = int(own.sum()), np.sort(self.statistics)
         others = self.n - count
-        if not others:
-            return 1.0
         ranks = (np.searchsorted(ordered, self.statistics, "left") + np.searchsorted(ordered, self.statistics, "right") + 1) / 2
         excess = ranks[own].sum() - count * (self.n + 1) / 2
         return float(ndtr(-excess / np.sqrt(count * others * (self.n + 1) / 12)))
