@@ -233,42 +233,81 @@ def test_least_squares_of_windows_are_those_of_each_by_itself(arguments, seed):
         assert_same(found, expected)
 
 
-@given(windows(), seeds, st.integers(1, 40), st.sampled_from([1.0, 1e6, 1e-6]))
-def test_mixtures_are_sums_of_densities(arguments, seed, most_halves, scale):
+def mixtures_one_by_one(arguments, scales, n_halves):
+    """J arrays (wanted, n): ln sum_a (scale_a (1 + square_a / 4))^-(n_halves / 2)."""
     values, rows, maps, which, ends, _, wanted = arguments
-    rng = np.random.default_rng(seed)
-    scales = scale * np.exp(rng.normal(size=(len(which), len(ends), which.shape[1])))
-    n_halves = rng.integers(1, most_halves + 1, len(ends))
-    expected = []
+    mixtures = []
     for j, squares in enumerate(squares_one_by_one(values, rows, maps, which, ends, wanted)):
         own = scales[np.minimum(np.arange(len(squares)), len(scales) - 1), j]
         bases = np.log(own)[..., None] + np.log1p(squares / 4)
-        expected.append(np.logaddexp.reduce(-n_halves[j] / 2 * bases, axis=1).ravel())
-    for module in {_kernels_numpy, _compiled() if kernels.COMPILED else _kernels_numpy}:
-        mixed = np.full(int(wanted.sum()) * values.shape[1], -7.0)
-        module.window_mixtures(*arguments, scales, n_halves, mixed, 4.0)
-        assert_same(mixed, np.concatenate(expected))
+        mixtures.append(np.logaddexp.reduce(-n_halves[j] / 2 * bases, axis=1))
+    return mixtures
 
 
-@given(windows(), seeds, st.integers(1, 40), st.sampled_from([0.0, -30.0, 30.0, 3.0]))
-def test_evidence_is_a_difference_of_densities_where_it_is_above_its_floor(arguments, seed, most_halves, constant):
-    values, _, _, which, ends, _, wanted = arguments
-    rng = np.random.default_rng(seed)
-    scales = np.exp(0.1 * rng.normal(size=(len(which), len(ends), which.shape[1])))
-    n_halves, constants = rng.integers(1, most_halves + 1, len(ends)), constant + rng.normal(size=len(ends) - 1)
-    floors = rng.choice([-np.inf, 0.0, 1.0, constant], len(constants))
+def random_floors(rng, shape, *further):
+    """Of some all is wanted, of others nothing, or what is larger than they are."""
+    return rng.choice([-np.inf, 0.0, 1.0, np.inf, *further], shape)
+
+
+@st.composite
+def windows_of_points(draw):
+    """The same, where windows are points of D numbers and have as many outputs; and D."""
+    values, rows, maps, which, ends, reach, wanted = draw(windows())
+    d, rng = draw(st.integers(1, 3)), np.random.default_rng(draw(seeds))
+    n_outputs = maps.shape[1] * d
+    n_inputs = n_outputs + draw(st.integers(0, 3))
+    reach = np.maximum.accumulate(rng.integers(1, n_inputs + 1, n_outputs))
+    maps = rng.normal(size=(len(maps), n_outputs, n_inputs)) * (np.arange(n_inputs) < reach[:, None])
+    rows = rng.integers(0, len(values), (len(rows), n_inputs))
+    return (values, rows, maps, which, ends * d, reach, wanted), d
+
+
+@given(
+    windows_of_points(), seeds, st.integers(1, 40), st.sampled_from([0.0, -30.0, 30.0, 3.0]), st.sampled_from([0.3, 3.0, 1e3])
+)
+def test_evidence_for_rest_is_a_difference_of_densities_where_it_is_above_its_floor(some, seed, most_halves, constant, std):
+    arguments, d = some
+    values, rows, _, which, ends, _, wanted = arguments
     if len(ends) == 1:
         return
-    mixtures = np.empty(int(wanted.sum()) * values.shape[1])
-    _kernels_numpy.window_mixtures(*arguments, scales, n_halves, mixtures, 4.0)
-    here, *together = kernels.split_sums(mixtures, wanted, values.shape[1])
-    squares = rng.exponential(60.0, int(wanted[1:].sum()) * values.shape[1])
-    of_each = zip(kernels.split_sums(squares, wanted[1:], values.shape[1]), together, constants, floors, strict=True)
-    expected = [(c - some / 2 - mixed + here[: len(some)], floor) for some, mixed, c, floor in of_each]
-    expected = np.concatenate([np.where(evidence > floor, evidence, -np.inf).ravel() for evidence, floor in expected])
+    rng, first = np.random.default_rng(seed), rows.shape[1] - arguments[2].shape[1]
+    scales = np.exp(0.1 * rng.normal(size=(len(which), len(ends), which.shape[1])))
+    n_halves, constants = rng.integers(1, most_halves + 1, len(ends)), constant + rng.normal(size=len(ends) - 1)
+    stds, floors = std * (1 + rng.random(d)), random_floors(rng, (len(constants), values.shape[1]), constant)
+    here, *together = mixtures_one_by_one(arguments, scales, n_halves)
+    expected = []
+    for mixed, c, floor, end in zip(together, constants, floors, ends[1:], strict=True):
+        points = values[rows[: len(mixed), first + ends[0] - d : first + end]]
+        points = points.reshape(len(mixed), 1 + (end - ends[0]) // d, d, values.shape[1])
+        moved = (points[:, 1:] - points[:, :1]) / stds[:, None]
+        inverse = np.linalg.inv(np.ones((moved.shape[1], moved.shape[1])) + np.eye(moved.shape[1]))
+        squares = np.einsum("gpdn,pq,gqdn->gn", moved, inverse, moved)
+        evidence = c - squares / 2 - mixed + here[: len(mixed)]
+        expected.append(np.where(evidence > floor, evidence, -np.inf).ravel())
     for module in {_kernels_numpy, _compiled() if kernels.COMPILED else _kernels_numpy}:
-        found = squares.copy()
-        module.window_evidence(*arguments, scales, n_halves, constants, floors, found, 4.0, int(rng.integers(which.shape[1])))
+        found, central = np.full(int(wanted[1:].sum()) * values.shape[1], -7.0), int(rng.integers(which.shape[1]))
+        module.window_evidence(*arguments, scales, n_halves, stds, constants, floors, found, 4.0, central)
+        np.testing.assert_allclose(found, np.concatenate(expected), rtol=1e-12, atol=1e-11)
+
+
+@given(windows(), seeds, st.integers(1, 40), st.sampled_from([1.0, 1e6, 1e-6]))
+def test_ratios_of_mixtures_are_those_of_sums_of_densities_where_they_are_above_their_floor(
+    arguments, seed, most_halves, scale
+):
+    values, rows, maps, which, ends, reach, wanted = arguments
+    rng, n_others = np.random.default_rng(seed), int(np.random.default_rng(seed).integers(1, 4))
+    wanted = np.full_like(wanted, wanted[0])
+    others = rng.normal(size=maps.shape) * (np.arange(maps.shape[2]) < reach[:, None])
+    other_which = rng.integers(0, len(maps), (len(which), n_others))
+    scales, other_scales = (scale * np.exp(rng.normal(size=(len(which), len(ends), k))) for k in (which.shape[1], n_others))
+    n_halves, floors = rng.integers(1, most_halves + 1, len(ends)), random_floors(rng, values.shape[1], -3.0)
+    own, other = (values, rows, maps, which, ends, reach, wanted), (values, rows, others, other_which, ends, reach, wanted)
+    ratios = mixtures_one_by_one(other, other_scales, n_halves)[-1] - mixtures_one_by_one(own, scales, n_halves)[-1]
+    expected = np.where(ratios > floors, ratios, -np.inf).ravel()
+    contrary = (others, other_which, reach, other_scales)
+    for module in {_kernels_numpy, _compiled() if kernels.COMPILED else _kernels_numpy}:
+        found, central = np.full(len(expected), -7.0), int(rng.integers(which.shape[1]))
+        module.window_ratios(*own, scales, n_halves, *contrary, floors, found, 4.0, central)
         np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-11)
 
 
@@ -276,11 +315,51 @@ def test_evidence_is_a_difference_of_densities_where_it_is_above_its_floor(argum
 @pytest.mark.parametrize("central", [-1, 1])
 def test_an_account_that_is_not_there_is_refused(central):
     one = np.ones(2, dtype=np.int64)
-    rows, which = np.zeros((1, 1), dtype=np.int64), np.zeros((1, 1), dtype=np.int64)
-    arguments = np.ones((1, 3)), rows, np.ones((1, 2, 1)), which, np.array([1, 2]), one, one, np.ones((1, 2, 1)), one
-    _compiled().window_evidence(*arguments, np.zeros(1), np.zeros(1), np.zeros(3), 4.0, 0)
+    rows, which = np.zeros((1, 2), dtype=np.int64), np.zeros((1, 1), dtype=np.int64)
+    maps, scales, stds = np.ones((1, 2, 2)), np.ones((1, 2, 1)), np.ones(1)
+    arguments = np.ones((1, 3)), rows, maps, which, np.array([1, 2]), one, one, scales, one
+    contrary, found = (maps, which, one, scales, np.zeros(3)), np.zeros(3)
+    _compiled().window_evidence(*arguments, stds, stds, np.zeros((1, 3)), found, 4.0, 0)
+    _compiled().window_ratios(*arguments, *contrary, found, 4.0, 0)
     with pytest.raises(ValueError, match="one of 1 accounts"):
-        _compiled().window_evidence(*arguments, np.zeros(1), np.zeros(1), np.zeros(3), 4.0, central)
+        _compiled().window_evidence(*arguments, stds, stds, np.zeros((1, 3)), found, 4.0, central)
+    with pytest.raises(ValueError, match="one of 1 accounts"):
+        _compiled().window_ratios(*arguments, *contrary, found, 4.0, central)
+
+
+@needs_extension
+@pytest.mark.parametrize("fault", ["stds", "no stds", "ends", "inputs", "constants", "floors"])
+def test_rest_that_does_not_belong_to_windows_is_refused(fault):
+    values, maps = np.ones((5, 3)), np.ones((2, 4, 5))
+    rows, which, ends, reach, wanted = (
+        np.zeros((6, 5), dtype=np.int64),
+        np.array([[0], [1]]),
+        np.array([2, 4]),
+        *np.ones((2, 4), int),
+    )
+    wanted, stds, constants, floors = wanted[:2], np.ones(2), np.ones(1), np.zeros((1, 3))
+
+    def weigh():
+        scales, n_halves = np.ones((2, 2, 1)), np.ones(2, dtype=np.int64)
+        arguments = values, rows, maps, which, ends, reach, wanted, scales, n_halves
+        _compiled().window_evidence(*arguments, stds, constants, floors, np.empty(3), 4.0, 0)
+
+    weigh()
+    match fault:
+        case "stds":
+            stds = np.ones(3)
+        case "no stds":
+            stds = np.ones(0)
+        case "ends":
+            ends = np.array([2, 3])
+        case "inputs":
+            rows, maps = rows[:, :3].copy(), maps[..., :3].copy()
+        case "constants":
+            constants = np.ones(2)
+        case "floors":
+            floors = np.zeros((1, 2))
+    with pytest.raises(ValueError, match=r"stds|constants|floors"):
+        weigh()
 
 
 @needs_extension
@@ -292,8 +371,11 @@ def test_logarithms_of_mixtures_are_those_of_the_library(square):
     least = float(np.finfo(float).tiny)
     for scale in (least / 8, least, 1e-20, 0.5, 0.7071067811865475, 1.0, 1.4142135623730951, 1e20):
         found = np.empty(11)
-        arguments = values, zero, np.ones((1, 1, 1)), zero, one, one, one, np.full((1, 1, 1), scale), 2 * one
-        _compiled().window_mixtures(*arguments, found, 4.0)
+        # Compared with one that is zero everywhere: all squares are zero, and the scale is one.
+        arguments = values, zero, np.zeros((1, 1, 1)), zero, one, one, one, np.ones((1, 1, 1)), 2 * one
+        everything = np.full(11, -np.inf)
+        contrary = np.ones((1, 1, 1)), zero, one, np.full((1, 1, 1), scale)
+        _compiled().window_ratios(*arguments, *contrary, everything, found, 4.0, 0)
         expected = -np.log(scale + scale / 4 * np.sqrt(square) ** 2)
         np.testing.assert_allclose(found, expected, rtol=1e-15, atol=1e-15)
 

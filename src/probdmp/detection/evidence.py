@@ -18,7 +18,7 @@ from probdmp.checks import FloatArray, IntArray
 from probdmp.detection.path_model import PathModel
 from probdmp.detection.phase_clock import TICKS
 from probdmp.detection.trajectory_statistics import SHIFT_STD
-from probdmp.detection.window_maps import Densities, Other, WindowInputs, WindowMaps, linear_maps
+from probdmp.detection.window_maps import Densities, Rest, WindowInputs, WindowMaps
 from probdmp.detection.windows import PathWindows, inverse_of_cholesky
 
 __all__ = ["DEGREES_OF_FREEDOM", "EVIDENCE", "Evidence", "Foreseen", "Pace", "Standstill"]
@@ -32,6 +32,13 @@ LAST_STANDSTILL = 92
 """After this tick the movement may be coming to its end, and standing still is no evidence."""
 SLOWED = 0.5
 """Speed of what is called slow."""
+FIRST_AHEAD = 3
+"""Points ahead after which it mostly is plain that an execution has not slowed down."""
+
+
+def central_of(shifts: IntArray) -> int:
+    """Which shift of tempo is the likeliest one beforehand."""
+    return int(np.argmin(np.abs(shifts)))
 
 
 class Foreseen:
@@ -57,37 +64,38 @@ class Foreseen:
         # p^(-2 / halves): what 1 + square / freedom is multiplied with before it is raised to that power
         self._bases = np.exp(scales / (-(DEGREES_OF_FREEDOM + counts) / 2))
 
-    def mixtures(self, inputs: WindowInputs, offsets: IntArray, points: IntArray, wanted: IntArray) -> list[FloatArray]:
-        """Log-densities of the first points of windows at the first places, of executions side by side.
+    def evidence(
+        self, inputs: WindowInputs, offsets: IntArray, points: IntArray, wanted: IntArray, rest: Rest, floors: FloatArray
+    ) -> list[FloatArray]:
+        """Nats that speak for rest since the first of the points, of executions side by side.
 
         Parameters
         ----------
         inputs : of which nothing is unseen.
-        offsets : (P) ticks at which the points are seen, relative to the place.
-        points, wanted : (J) of so many points, increasing, at so many places, not increasing.
-
-        Returns
-        -------
-        J arrays (wanted, n).
-        """
-        numbers, ends = np.repeat(offsets, self._dof), points * self._dof
-        return self._windows.maps.mixtures(inputs, numbers, ends, wanted, self._densities(points))
-
-    def evidence(
-        self, inputs: WindowInputs, offsets: IntArray, points: IntArray, wanted: IntArray, other: Other, floors: FloatArray
-    ) -> list[FloatArray]:
-        """Nats that speak for another account of what follows the first of the points; arguments as above.
-
-        Parameters
-        ----------
-        floors : (J - 1) up to which they need not be known; -infinity then.
+        offsets : (P) ticks at which the points of windows are seen, relative to the place.
+        points, wanted : (J) of so many points, increasing, at so many places, the first ones, not increasing.
+        floors : (J - 1, n) up to which they need not be known; -infinity then.
 
         Returns
         -------
         J - 1 arrays (wanted, n).
         """
         numbers, ends = np.repeat(offsets, self._dof), points * self._dof
-        return self._windows.maps.evidence(inputs, numbers, ends, wanted, self._densities(points), other, floors)
+        return self._windows.maps.evidence(inputs, numbers, ends, wanted, self._densities(points), rest, floors)
+
+    def ratios(
+        self, inputs: WindowInputs, offsets: IntArray, points: IntArray, wanted: int, other: "Foreseen", floors: FloatArray
+    ) -> FloatArray:
+        """Nats that speak for what another foresees of the last of the points, (wanted, n) array.
+
+        Parameters
+        ----------
+        points : (J) increasing: after each of the others it may be plain that there is nothing.
+        floors : (n,) up to which they need not be known; -infinity then.
+        """
+        numbers, ends = np.repeat(offsets, self._dof), points * self._dof
+        contrary, central = (other._windows.maps, other._densities(points)), central_of(self._windows.shifts)
+        return self._windows.maps.ratios(inputs, numbers, ends, wanted, self._densities(points), contrary, floors, central)
 
     def _densities(self, points: IntArray) -> Densities:
         bases = np.ascontiguousarray(self._bases[..., points - 1].swapaxes(1, 2))
@@ -158,6 +166,7 @@ class Standstill:
         self._rest_stds = np.sqrt(REST_STD**2 + model.noise_variances)
         self._points_at = np.array([np.searchsorted(self.ahead, h, "right") for h in self.horizons])
         self._constants = np.array([self._rest_constants(int(points)) for points in self._points_at])
+        self._rest = Rest(self._rest_stds, self._constants, central_of(self.shifts))
 
     def weigh(self, inputs: WindowInputs, wanted: IntArray, floors: FloatArray) -> list[FloatArray]:
         """The same for each horizon at so many places, the first ones: J arrays (wanted, n).
@@ -165,12 +174,12 @@ class Standstill:
         Parameters
         ----------
         inputs : of which nothing is unseen.
-        floors : (J) nats up to which it need not be known; it may be -infinity then.
+        floors : (J, n) nats up to which it need not be known; it is -infinity then.
         """
         before = len(self.before)
         points = np.array([before, *(before + self._points_at)])
         offsets = np.concatenate([-self.before, self.ahead])
-        return self._going_on.evidence(inputs, offsets, points, np.array([wanted[0], *wanted]), self._at_rest_since, floors)
+        return self._going_on.evidence(inputs, offsets, points, np.array([wanted[0], *wanted]), self._rest, floors)
 
     @cached_property
     def _looks(self) -> Looks:
@@ -202,18 +211,6 @@ class Standstill:
         moved *= moved
         distances = (np.add.reduceat(moved, starts) - sums * sums / (self._points_at[:, None] + 1)).sum(axis=1)
         return np.asarray(self._constants - distances / 2 - (together - here))
-
-    @cached_property
-    def _at_rest_since(self) -> Other:
-        """What follows a place has to do with nothing but the place: together they are white noise after these maps."""
-        since = np.hstack([-self._rest_whitening.sum(axis=1, keepdims=True), self._rest_whitening])
-        whitening = np.kron(since, np.diag(1 / self._rest_stds))[None]
-        size, dof = whitening.shape[2], len(self._rest_stds)
-        signals = np.tile(np.arange(dof), size // dof)
-        once = np.zeros((1, 1), dtype=np.int64)
-        maps = linear_maps(whitening, np.zeros((1, size)), np.zeros((1, size, dof)), signals, once)
-        offsets, central = np.repeat([0, *self.ahead], dof), int(np.argmin(np.abs(self.shifts)))
-        return Other(maps, offsets, self._points_at * dof, self._constants, central)
 
     def _rest_constants(self, points: int) -> float:
         """ln of the density of so many points where it is largest."""
@@ -258,10 +255,12 @@ class Pace:
 
     def weigh(self, inputs: WindowInputs, wanted: IntArray, floors: FloatArray) -> list[FloatArray]:
         """The same for each horizon at so many places, the first ones: J arrays (wanted, n); arguments as for `Standstill`."""
-        points = len(self.before) + np.array([np.searchsorted(self.ahead, h, "right") for h in self.horizons])
-        offsets = np.concatenate([-self.before, self.ahead])
-        slowed, going_on = (a.mixtures(inputs, offsets, points, wanted) for a in (self._slowed, self._going_on))
-        return [one - other for one, other in zip(slowed, going_on, strict=True)]
+        offsets, before = np.concatenate([-self.before, self.ahead]), len(self.before)
+        points = [before + np.array([FIRST_AHEAD, np.searchsorted(self.ahead, h, "right")]) for h in self.horizons]
+        return [
+            self._going_on.ratios(inputs, offsets, own, int(count), self._slowed, floor)
+            for own, count, floor in zip(points, wanted, floors, strict=True)
+        ]
 
     @cached_property
     def _looks(self) -> tuple[Looks, Looks]:

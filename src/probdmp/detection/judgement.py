@@ -5,6 +5,7 @@ grows with the value of a channel, so the largest values say how large it gets, 
 """
 
 from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -92,10 +93,8 @@ def judge_recorded(
     durations, dts : (N,) arrays, seconds.
     """
     paths, sensors, n = recorded.paths, recorded.sensors, len(recorded.paths)
-    unsurprising = as_evidence(standard.calibration.least_values(np.zeros(())))
-    evidence = expectation.trajectory.evidence(paths.transpose(1, 2, 0), recorded.goals, unsurprising)
-    if np.any(recorded.counts < paths.shape[1]):
-        evidence[:, np.arange(paths.shape[1])[:, None] >= recorded.counts] = np.nan
+    floors = partial(_needed, standard)
+    evidence = expectation.trajectory.evidence(paths.transpose(1, 2, 0), recorded.counts, recorded.goals, floors)
     moments = _moments(standard, evidence)
     rows, at = np.arange(n), np.maximum(moments.ticks, 0)
     alarmed_at = np.where(moments.is_alarm, recorded.steps[rows, at], NEVER)
@@ -122,6 +121,14 @@ def judge_recorded(
         sensors.is_stale,
         sensors.faulty_from < NEVER,
     )
+
+
+def _needed(standard: Standard, highest: FloatArray) -> FloatArray:
+    """What evidence (C, N) has to be above to be as surprising as the highest so far, or to raise an alarm."""
+    calibration = standard.calibration
+    reached = calibration.surprise(as_values(highest).T).max(axis=-1)
+    least = as_evidence(calibration.least_values(np.minimum(reached, standard.threshold)).T)
+    return np.nextafter(least, -np.inf)
 
 
 def _moments(standard: Standard, evidence: FloatArray) -> _Moments:

@@ -1,5 +1,6 @@
 """All channels of the trajectory together, over recordings side by side or tick by tick."""
 
+from collections.abc import Callable
 from functools import cached_property
 from itertools import groupby
 from operator import attrgetter
@@ -45,10 +46,16 @@ SIDE_BY_SIDE = 520
 of two, or the numbers of one window would all compete for the same few places of the cache."""
 
 
+Floors = Callable[[FloatArray], FloatArray]
+"""From the highest evidence of each channel so far, (C, n), NaN where it is not known, to what has to be exceeded, (C, n)."""
+
+
 class Judge(Protocol):
     """A statistic of windows, one at each tick."""
 
     offsets: IntArray
+
+    def weigh(self, inputs: WindowInputs, length: int) -> FloatArray: ...
 
     def judge(self, ticks: IntArray, windows: FloatArray, means: FloatArray) -> FloatArray: ...
 
@@ -67,6 +74,8 @@ class TrajectoryModel:
         self.feel = tuple(ChannelStatistic(whole, signal) for signal in range(self._n_dof, whole.means.shape[1]))
         """One statistic for each learned channel."""
         self.position, self.displacement = Position(model), Displacement(model)
+        further = enumerate(self.feel, len(MOVEMENT_CHANNELS))
+        self._plain: list[tuple[int, Judge]] = [(0, self.position), (1, self.displacement), *further]
         questions = [(evidence, ticks) for evidence in [kind(model) for kind in EVIDENCE] for ticks in evidence.horizons]
         self.horizons = tuple(
             Horizon(channel, evidence, ticks, np.concatenate([-evidence.before, evidence.ahead[evidence.ahead <= ticks]]))
@@ -87,56 +96,70 @@ class TrajectoryModel:
         -------
         (n, T, C) array in the order of `channels_for`; the larger, the more suspicious.
         """
-        everything = np.full(len(MOVEMENT_CHANNELS) + len(self.feel), -np.inf)
-        return as_values(self.evidence(paths.transpose(1, 2, 0), goals, everything)).transpose(2, 1, 0)
+        counts = np.full(len(paths), paths.shape[1])
+        return as_values(self.evidence(paths.transpose(1, 2, 0), counts, goals, all_of_it)).transpose(2, 1, 0)
 
-    def evidence(self, paths: FloatArray, goals: FloatArray, floors: FloatArray) -> FloatArray:
+    def evidence(self, paths: FloatArray, counts: IntArray, goals: FloatArray, floors: Floors) -> FloatArray:
         """The same before `as_values`, with executions innermost: from paths (T, S, n) to (C, T, n).
 
         Parameters
         ----------
-        floors : (C,) array: what is not above them need not be known, and may be -infinity.
+        counts : (n,) array: ticks of each execution; there is no evidence after them.
+        floors : what evidence that weighs two accounts has to be above to matter; what is not may be -infinity.
         """
         n = paths.shape[-1]
         evidence = np.empty((len(MOVEMENT_CHANNELS) + len(self.feel), len(paths), n))
         for begin in range(0, n, SIDE_BY_SIDE):
             part = slice(begin, begin + SIDE_BY_SIDE)
-            self._weigh(np.ascontiguousarray(paths[..., part]), goals[part], floors, evidence[..., part])
+            own = np.ascontiguousarray(paths[..., part])
+            evidence[..., part] = self._weigh(own, counts[part], goals[part], floors)
         return evidence
 
-    def _weigh(self, paths: FloatArray, goals: FloatArray, floors: FloatArray, values: FloatArray) -> None:
+    def _weigh(self, paths: FloatArray, counts: IntArray, goals: FloatArray, floors: Floors) -> FloatArray:
         unseen, length = np.asarray(np.isnan(paths)), len(paths)
-        is_lossy = unseen.any()
+        is_lossy, is_over = unseen.any(), np.arange(length)[:, None] >= counts
         inputs = WindowInputs.of(np.where(unseen, 0.0, paths) if is_lossy else paths, self._whole.ahead(goals).T)
-        values[:] = np.nan
-        values[0], values[1] = self.position.weigh(inputs, length), self.displacement.weigh(inputs, length)
-        for statistic, value in zip(self.feel, values[len(MOVEMENT_CHANNELS) :], strict=True):
-            value[...] = statistic.weigh(inputs, length)
+        values = np.full((len(MOVEMENT_CHANNELS) + len(self.feel), length, len(counts)), np.nan)
+        means = self._whole.means_for(goals) if is_lossy else None
+        for channel, statistic in self._plain:
+            values[channel] = statistic.weigh(inputs, length)
+        if means is not None:
+            self._judge_again(values, paths, unseen, means)
+        values[1] = relative_over_time(values[1])
+        highest = np.full((len(values), len(counts)), np.nan)
+        for channel, _ in self._plain:
+            values[channel, is_over] = np.nan
+            highest[channel] = np.fmax.reduce(values[channel])
+        least = floors(highest)
         for evidence, horizons in self._questions:
             wanted = np.maximum(min(length, evidence.last + 1) - np.array(evidence.horizons), 0)
-            own = floors[[horizon.channel for horizon in horizons]]
+            own = np.ascontiguousarray(least[[horizon.channel for horizon in horizons]])
             for horizon, found in zip(horizons, evidence.weigh(inputs, wanted, own) if wanted[0] else (), strict=False):
                 values[horizon.channel, horizon.ticks : horizon.ticks + len(found)] = found
-        if is_lossy:
-            self._look_again(values, paths, unseen, self._whole.means_for(goals))
-        values[1] = relative_over_time(values[1])
+        if means is not None:
+            self._weigh_again(values, paths, unseen, means)
+        values[:, is_over] = np.nan
+        return values
 
-    def _look_again(self, values: FloatArray, paths: FloatArray, unseen: BoolArray, means: FloatArray) -> None:
+    def _judge_again(self, values: FloatArray, paths: FloatArray, unseen: BoolArray, means: FloatArray) -> None:
         """Judge windows of which something was not seen by what was seen of them."""
-        length, d, n_movement = len(paths), self._n_dof, len(MOVEMENT_CHANNELS)
-        plain: list[tuple[int, Judge]] = [(0, self.position), (1, self.displacement), *enumerate(self.feel, n_movement)]
+        d, n_movement = self._n_dof, len(MOVEMENT_CHANNELS)
         for k in np.flatnonzero(unseen.any(axis=(0, 1))):
-            path, mean = paths[None, :, :, k], means[k : k + 1]
-            moved, lost = (np.asarray(unseen[:, :s, k].any(axis=1)) for s in (d, path.shape[2]))
-            for channel, statistic in plain:
-                s = d if channel < n_movement else path.shape[2]
-                at = _places(moved if channel < n_movement else lost, statistic.offsets, length)
-                found = statistic.judge(at, gather(path[..., :s], at, statistic.offsets), mean[..., :s])
-                values[channel, at, k] = found[0]
+            for channel, statistic in self._plain:
+                s = d if channel < n_movement else paths.shape[1]
+                path, mean = paths[None, :, :s, k], means[k : k + 1, :, :s]
+                at = _places(np.asarray(unseen[:, :s, k].any(axis=1)), statistic.offsets, len(paths))
+                values[channel, at, k] = statistic.judge(at, gather(path, at, statistic.offsets), mean)[0]
+
+    def _weigh_again(self, values: FloatArray, paths: FloatArray, unseen: BoolArray, means: FloatArray) -> None:
+        """The same of what weighs two accounts."""
+        d = self._n_dof
+        for k in np.flatnonzero(unseen[:, :d].any(axis=(0, 1))):
+            path, mean, moved = paths[None, :, :d, k], means[k : k + 1, :, :d], np.asarray(unseen[:, :d, k].any(axis=1))
             for evidence, horizons in self._questions:
-                last, offsets = min(length, evidence.last + 1), np.concatenate([-evidence.before, evidence.ahead])
+                last, offsets = min(len(paths), evidence.last + 1), np.concatenate([-evidence.before, evidence.ahead])
                 at = _places(moved, offsets, max(last - evidence.horizons[0], 0))
-                found = evidence.judge(at, gather(path[..., :d], at, offsets), mean[..., :d])[0]
+                found = evidence.judge(at, gather(path, at, offsets), mean)[0]
                 for horizon in horizons:
                     judged = at + horizon.ticks < last
                     values[horizon.channel, at[judged] + horizon.ticks, k] = found[judged, horizon.point]
@@ -153,6 +176,11 @@ class TrajectoryModel:
     def _asked(self) -> tuple[Statistics, Gathering]:
         statistics = Statistics(self.position, self.displacement, self.feel, self.horizons)
         return statistics, Gathering(statistics, self._n_dof, self._whole.means.shape[1])
+
+
+def all_of_it(highest: FloatArray) -> FloatArray:
+    """Floors of evidence of which all is wanted."""
+    return np.full_like(highest, -np.inf)
 
 
 def _places(lost: BoolArray, offsets: IntArray, count: int) -> IntArray:

@@ -13,7 +13,7 @@ import numpy as np
 from probdmp.checks import FloatArray, IntArray
 from probdmp.gaussian import kernels
 
-__all__ = ["Densities", "Other", "WindowInputs", "WindowMaps", "linear_maps"]
+__all__ = ["Densities", "Rest", "WindowInputs", "WindowMaps", "linear_maps"]
 
 
 class WindowInputs(NamedTuple):
@@ -97,16 +97,6 @@ class WindowMaps:
         found = self._squares(inputs, offsets, ends, wanted, penalties)
         return kernels.split_sums(found, wanted, inputs.values.shape[1])
 
-    def mixtures(
-        self, inputs: WindowInputs, offsets: IntArray, ends: IntArray, wanted: IntArray, densities: "Densities"
-    ) -> list[FloatArray]:
-        """Logarithms of densities of those squares, mixed over the shifts: J arrays (wanted, n); arguments as above."""
-        n = inputs.values.shape[1]
-        found = np.empty(int(wanted.sum()) * n)
-        bases, n_halves, freedom = densities
-        kernels.window_mixtures(*self._asked(inputs, offsets, ends, wanted), bases, n_halves, found, freedom)
-        return kernels.split_sums(found, wanted, n)
-
     def evidence(
         self,
         inputs: WindowInputs,
@@ -114,25 +104,56 @@ class WindowMaps:
         ends: IntArray,
         wanted: IntArray,
         densities: "Densities",
-        other: "Other",
+        rest: "Rest",
         floors: FloatArray,
     ) -> list[FloatArray]:
-        """Nats that speak for another account of what follows the first end; arguments as above.
+        """Nats that speak for rest since the first end; arguments as for `squares`.
 
         Parameters
         ----------
-        floors : (J - 1) up to which it need not be known; it is -infinity then.
+        densities : of the squares up to each end, mixed over shifts.
+        floors : (J - 1, n) up to which it need not be known; it is -infinity then.
 
         Returns
         -------
         J - 1 arrays (wanted, n).
         """
-        maps, points, other_ends, constants, central = other
-        found = maps._squares(inputs, points, other_ends, wanted[1:], np.zeros(1))
+        stds, constants, central = rest
+        found = np.empty(int(wanted[1:].sum()) * inputs.values.shape[1])
         bases, n_halves, freedom = densities
         asked = self._asked(inputs, offsets, ends, wanted)
-        kernels.window_evidence(*asked, bases, n_halves, constants, floors, found, freedom, central)
+        kernels.window_evidence(*asked, bases, n_halves, stds, constants, floors, found, freedom, central)
         return kernels.split_sums(found, wanted[1:], inputs.values.shape[1])
+
+    def ratios(
+        self,
+        inputs: WindowInputs,
+        offsets: IntArray,
+        ends: IntArray,
+        wanted: int,
+        densities: "Densities",
+        other: tuple["WindowMaps", "Densities"],
+        floors: FloatArray,
+        central: int,
+    ) -> FloatArray:
+        """Nats that speak for other windows; arguments as above.
+
+        Parameters
+        ----------
+        ends : (J) the last of them is asked about; the others are where it may become plain that there is nothing.
+        floors : (n,) array: up to which it need not be known.
+        central : the account that is likeliest beforehand.
+
+        Returns
+        -------
+        (wanted, n) array.
+        """
+        (bases, n_halves, freedom), (maps, (other_bases, _, _)) = densities, other
+        found, n = np.empty((wanted, inputs.values.shape[1])), np.full(len(ends), wanted)
+        asked = self._asked(inputs, offsets, ends, n)
+        contrary = (maps.maps, maps.which, maps.reach, other_bases)
+        kernels.window_ratios(*asked, bases, n_halves, *contrary, floors, found.reshape(-1), freedom, central)
+        return found
 
     def _squares(
         self, inputs: WindowInputs, offsets: IntArray, ends: IntArray, wanted: IntArray, penalties: FloatArray
@@ -159,14 +180,11 @@ class Densities(NamedTuple):
     freedom: float
 
 
-class Other(NamedTuple):
-    """Another account of what follows a place, a Gaussian, and which shift is the likeliest one beforehand."""
+class Rest(NamedTuple):
+    """That an execution is where it was, and which shift is the likeliest one beforehand."""
 
-    maps: WindowMaps
-    offsets: IntArray
-    """Ticks at which each number of a window of its own is seen, relative to the place."""
-    ends: IntArray
-    """(J - 1) outputs up to which it goes."""
+    stds: FloatArray
+    """(D,) array, as fractions of the range: how much what is at rest still moves."""
     constants: FloatArray
     """(J - 1) logarithms of its density where it is largest."""
     central: int

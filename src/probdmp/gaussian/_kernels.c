@@ -152,15 +152,22 @@ typedef struct {
     Py_ssize_t n, n_values, n_places, n_inputs, n_maps, n_outputs, n_mapped, n_accounts, n_sums;
     const double *values, *maps;
     const int64_t *rows, *which, *ends, *reach, *wanted;
-    const double *penalties; /* of the least squares; none where mixtures are asked for */
-    const double *scales;
+    const double *penalties; /* of the least squares */
+    const double *scales;    /* of mixtures */
     const int64_t *n_halves;
     double inverse;
-    const double *constants, *floors; /* of evidence; none where it is not asked for */
     Py_ssize_t central;
-    int64_t *extents; /* to work in: so are the following */
-    double *packed, *window, *sums, *own;
+    int64_t *extents, *own_extents; /* to work in: so are the following */
+    double *packed, *own, *window, *sums, *more;
 } Windows;
+
+/* What weighs another account of windows: none, or that they are at rest, or other windows. */
+typedef struct {
+    Py_ssize_t n_dof;
+    const double *stds, *constants; /* of rest */
+    const Windows *windows;
+    const double *floors;
+} Contrary;
 
 /* Recordings (N, T, S), and points between their samples: (before - after) beyond + after, less the start, in ranges. */
 typedef struct {
@@ -202,11 +209,18 @@ typedef struct {
 #define mix_lane NAMED(mix_lane)
 #define least_lane NAMED(least_lane)
 #define log_density NAMED(log_density)
+#define some_of NAMED(some_of)
 #define gather NAMED(gather)
 #define put NAMED(put)
 #define look_at_lane NAMED(look_at_lane)
-#define highest_of NAMED(highest_of)
-#define weigh_lane NAMED(weigh_lane)
+#define any_above NAMED(any_above)
+#define square_next NAMED(square_next)
+#define mapped_at NAMED(mapped_at)
+#define at_rest NAMED(at_rest)
+#define weigh_rest NAMED(weigh_rest)
+#define weigh_windows NAMED(weigh_windows)
+#define pack_place NAMED(pack_place)
+#define weigh_all NAMED(weigh_all)
 #define look_at_windows NAMED(look_at_windows)
 
 #define look_for_odd NAMED(look_for_odd)
@@ -232,6 +246,7 @@ static void look_at_processor(void) {}
 #endif
 #undef filter_all
 #undef look_at_windows
+#undef weigh_all
 #undef look_for_odd
 #undef draw_lines
 #undef step_all
@@ -383,8 +398,8 @@ static PyObject *smoothed_states(PyObject *module, PyObject *const *arguments, P
 #define WINDOWS {"values", 0, 2, 0}, {"rows", 0, 2, 1}, {"maps", 0, 3, 0}, {"which", 0, 2, 1}, {"ends", 0, 1, 1}, \
                 {"reach", 0, 1, 1}, {"wanted", 0, 1, 1}
 
-/* Of the first sums nothing is written. */
-static int windows_fit(const Array *x, const Array *found, Py_ssize_t n_left_out, Windows *s)
+/* Of the first sums nothing is written. `n_found` numbers are. */
+static int windows_fit(const Array *x, Py_ssize_t n_found, Py_ssize_t n_left_out, Windows *s)
 {
     *s = (Windows){
         .n = x[0].view.shape[1], .n_values = x[0].view.shape[0], .n_places = x[1].view.shape[0], .n_inputs = x[1].view.shape[1],
@@ -407,34 +422,54 @@ static int windows_fit(const Array *x, const Array *found, Py_ssize_t n_left_out
     for (Py_ssize_t i = 0; is_sound && i < s->n_places * s->n_inputs; i++) is_sound = s->rows[i] >= 0 && s->rows[i] < s->n_values;
     for (Py_ssize_t i = 0; is_sound && i < s->n_mapped * s->n_accounts; i++)
         is_sound = s->which[i] >= 0 && s->which[i] < s->n_maps;
-    if (!is_sound || found->view.shape[0] != size) {
+    if (!is_sound || n_found != size) {
         PyErr_SetString(PyExc_ValueError, "rows, maps, which, ends, reach, wanted and found do not belong together");
         return 0;
     }
     return 1;
 }
 
+/* Room to work in for `n_more` lanes, that has to be freed; NULL without memory. */
+static double *room_for(Windows *s, Py_ssize_t n_more)
+{
+    const Py_ssize_t groups = s->n_outputs * s->n_accounts / OUTPUTS + s->n_sums, own = s->n_outputs / OUTPUTS + s->n_sums;
+    const Py_ssize_t k = s->n_inputs, lanes = (k + s->n_accounts + n_more + 1) * WIDTH;
+    double *work = malloc(((groups + own) * OUTPUTS * k + lanes) * sizeof(double) + (groups + own) * sizeof(int64_t));
+    if (work == NULL) {
+        PyErr_NoMemory();
+        return NULL;
+    }
+    s->window = work + (-(uintptr_t)work / sizeof(double)) % WIDTH; /* where a lane begins with a line of the cache */
+    s->sums = s->window + k * WIDTH;
+    s->more = s->sums + s->n_accounts * WIDTH;
+    s->packed = s->more + n_more * WIDTH;
+    s->own = s->packed + groups * OUTPUTS * k;
+    s->extents = (int64_t *)(s->own + own * OUTPUTS * k);
+    s->own_extents = s->extents + groups;
+    return work;
+}
+
 /* Looks at windows that fit; 0 without memory. */
 static int look(Windows *s, double *found)
 {
-    const Py_ssize_t groups = s->n_outputs * s->n_accounts / OUTPUTS + s->n_sums, own = s->n_outputs / OUTPUTS + s->n_sums;
-    const Py_ssize_t k = s->n_inputs;
-    double *work = malloc(((groups + own) * OUTPUTS * k + (k + s->n_accounts + 1) * WIDTH) * sizeof(double));
-    s->extents = malloc((groups + own) * sizeof(int64_t));
-    const int has_memory = work != NULL && s->extents != NULL;
-    if (has_memory) {
-        s->window = work + (-(uintptr_t)work / sizeof(double)) % WIDTH; /* where a lane begins with a line of the cache */
-        s->sums = s->window + k * WIDTH;
-        s->packed = s->sums + s->n_accounts * WIDTH;
-        s->own = s->packed + groups * OUTPUTS * k;
-        Py_BEGIN_ALLOW_THREADS
-        CHOOSE(look_at_windows)(s, found);
-        Py_END_ALLOW_THREADS
-    } else
-        PyErr_NoMemory();
-    free(s->extents);
+    double *work = room_for(s, 0);
+    if (work == NULL) return 0;
+    Py_BEGIN_ALLOW_THREADS
+    CHOOSE(look_at_windows)(s, found);
+    Py_END_ALLOW_THREADS
     free(work);
-    return has_memory;
+    return 1;
+}
+
+/* Windows of several accounts that are mixed with scales. */
+static int mixtures_fit(const Array *scales, const Array *n_halves, double freedom, Windows *s)
+{
+    if (!agree(scales, "scales", s->n_mapped, s->n_sums, s->n_accounts, 0) || !agree(n_halves, "n_halves", s->n_sums, 0, 0, 0))
+        return 0;
+    s->scales = scales->data;
+    s->n_halves = n_halves->integers;
+    s->inverse = 1 / freedom;
+    return 1;
 }
 
 static PyObject *least_squares(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
@@ -444,7 +479,7 @@ static PyObject *least_squares(PyObject *module, PyObject *const *arguments, Py_
     Array x[COUNT];
     Windows s;
     if (take(arguments, given, specs, COUNT, x) < 0) return NULL;
-    int done = windows_fit(x, &x[COUNT - 1], 0, &s) && agree(&x[7], "penalties", s.n_accounts, 0, 0, 0);
+    int done = windows_fit(x, x[COUNT - 1].view.shape[0], 0, &s) && agree(&x[7], "penalties", s.n_accounts, 0, 0, 0);
     if (done) {
         s.penalties = x[7].data;
         done = look(&s, x[COUNT - 1].data);
@@ -454,60 +489,94 @@ static PyObject *least_squares(PyObject *module, PyObject *const *arguments, Py_
     Py_RETURN_NONE;
 }
 
-static PyObject *window_mixtures(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
+/* Two more arguments than arrays: the degrees of freedom of mixtures, and which of the accounts is asked first. */
+static int two_numbers(PyObject *const *arguments, Py_ssize_t given, int n_arrays, double *freedom, Py_ssize_t *central)
 {
-    static const Spec specs[] = {WINDOWS, {"scales", 0, 3, 0}, {"n_halves", 0, 1, 1}, {"found", 1, 1, 0}};
+    if (given != n_arrays + 2) {
+        PyErr_Format(PyExc_TypeError, "expected %d arrays and two numbers, got %zd arguments", n_arrays, given);
+        return -1;
+    }
+    *freedom = PyFloat_AsDouble(arguments[n_arrays]);
+    if (PyErr_Occurred()) return -1;
+    *central = PyLong_AsSsize_t(arguments[n_arrays + 1]);
+    return PyErr_Occurred() ? -1 : 0;
+}
+
+static int has_account(const Windows *s, Py_ssize_t central)
+{
+    if (central >= 0 && central < s->n_accounts) return 1;
+    PyErr_Format(PyExc_ValueError, "expected one of %zd accounts as the central one, got %zd", s->n_accounts, central);
+    return 0;
+}
+
+/* Whether what follows the first end are further points of as many degrees of freedom as the place before it has. */
+static int points_fit(const Windows *s, Py_ssize_t d)
+{
+    int is_sound = d > 0 && s->ends[0] >= d && s->n_inputs >= s->n_outputs;
+    for (Py_ssize_t j = 1; is_sound && j < s->n_sums; j++) is_sound = (s->ends[j] - s->ends[0]) % d == 0;
+    if (!is_sound) PyErr_SetString(PyExc_ValueError, "ends, maps and stds do not belong together");
+    return is_sound;
+}
+
+/* Weighs windows that fit against their contrary; 0 without memory. */
+static int weigh(Windows *s, Windows *other, Contrary *contrary, double *found)
+{
+    double *work = room_for(s, contrary->n_dof + 2 * s->n_sums), *further = other && work ? room_for(other, 0) : NULL;
+    const int has_room = work != NULL && (other == NULL || further != NULL);
+    if (has_room) {
+        if (other) other->window = s->window;
+        contrary->windows = other;
+        Py_BEGIN_ALLOW_THREADS
+        CHOOSE(weigh_all)(s, contrary, found);
+        Py_END_ALLOW_THREADS
+    }
+    free(further);
+    free(work);
+    return has_room;
+}
+
+static PyObject *window_evidence(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
+{
+    static const Spec specs[] = {WINDOWS, {"scales", 0, 3, 0}, {"n_halves", 0, 1, 1}, {"stds", 0, 1, 0}, {"constants", 0, 1, 0},
+                                 {"floors", 0, 2, 0}, {"found", 1, 1, 0}};
     enum { COUNT = sizeof(specs) / sizeof(specs[0]) };
     Array x[COUNT];
     Windows s;
-    if (given != COUNT + 1) {
-        PyErr_Format(PyExc_TypeError, "expected %d arrays and a number, got %zd arguments", COUNT, given);
-        return NULL;
-    }
-    const double freedom = PyFloat_AsDouble(arguments[COUNT]);
-    if (PyErr_Occurred() || take(arguments, COUNT, specs, COUNT, x) < 0) return NULL;
-    int done = windows_fit(x, &x[COUNT - 1], 0, &s);
-    done = done && agree(&x[7], "scales", s.n_mapped, s.n_sums, s.n_accounts, 0) && agree(&x[8], "n_halves", s.n_sums, 0, 0, 0);
+    double freedom;
+    Py_ssize_t central;
+    if (two_numbers(arguments, given, COUNT, &freedom, &central) < 0 || take(arguments, COUNT, specs, COUNT, x) < 0) return NULL;
+    int done = windows_fit(x, x[COUNT - 1].view.shape[0], 1, &s) && mixtures_fit(&x[7], &x[8], freedom, &s)
+               && has_account(&s, central) && points_fit(&s, x[9].view.shape[0])
+               && agree(&x[10], "constants", s.n_sums - 1, 0, 0, 0) && agree(&x[11], "floors", s.n_sums - 1, s.n, 0, 0);
     if (done) {
-        s.scales = x[7].data;
-        s.n_halves = x[8].integers;
-        s.inverse = 1 / freedom;
-        done = look(&s, x[COUNT - 1].data);
+        Contrary rest = {.n_dof = x[9].view.shape[0], .stds = x[9].data, .constants = x[10].data, .floors = x[11].data};
+        s.central = central;
+        done = weigh(&s, NULL, &rest, x[COUNT - 1].data);
     }
     release(x, COUNT);
     if (!done) return NULL;
     Py_RETURN_NONE;
 }
 
-static PyObject *window_evidence(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
+static PyObject *window_ratios(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
 {
-    static const Spec specs[] = {WINDOWS, {"scales", 0, 3, 0}, {"n_halves", 0, 1, 1}, {"constants", 0, 1, 0}, {"floors", 0, 1, 0},
-                                 {"found", 1, 1, 0}};
+    static const Spec specs[] = {WINDOWS, {"scales", 0, 3, 0}, {"n_halves", 0, 1, 1}, {"other_maps", 0, 3, 0}, {"other_which", 0, 2, 1},
+                                 {"other_reach", 0, 1, 1}, {"other_scales", 0, 3, 0}, {"floors", 0, 1, 0}, {"found", 1, 1, 0}};
     enum { COUNT = sizeof(specs) / sizeof(specs[0]) };
     Array x[COUNT];
-    Windows s;
-    if (given != COUNT + 2) {
-        PyErr_Format(PyExc_TypeError, "expected %d arrays and two numbers, got %zd arguments", COUNT, given);
-        return NULL;
-    }
-    const double freedom = PyFloat_AsDouble(arguments[COUNT]);
-    const Py_ssize_t central = PyErr_Occurred() ? -1 : PyLong_AsSsize_t(arguments[COUNT + 1]);
-    if (PyErr_Occurred() || take(arguments, COUNT, specs, COUNT, x) < 0) return NULL;
-    int done = windows_fit(x, &x[COUNT - 1], 1, &s);
-    done = done && agree(&x[7], "scales", s.n_mapped, s.n_sums, s.n_accounts, 0) && agree(&x[8], "n_halves", s.n_sums, 0, 0, 0)
-           && agree(&x[9], "constants", s.n_sums - 1, 0, 0, 0) && agree(&x[10], "floors", s.n_sums - 1, 0, 0, 0);
-    if (done && (central < 0 || central >= s.n_accounts)) {
-        PyErr_Format(PyExc_ValueError, "expected one of %zd accounts as the central one, got %zd", s.n_accounts, central);
-        done = 0;
-    }
+    Windows s, other;
+    double freedom;
+    Py_ssize_t central;
+    if (two_numbers(arguments, given, COUNT, &freedom, &central) < 0 || take(arguments, COUNT, specs, COUNT, x) < 0) return NULL;
+    const Array others[] = {x[0], x[1], x[9], x[10], x[4], x[11], x[6]};
+    const Py_ssize_t size = x[COUNT - 1].view.shape[0];
+    int done = windows_fit(x, size, x[4].view.shape[0] - 1, &s) && windows_fit(others, size, x[4].view.shape[0] - 1, &other)
+               && mixtures_fit(&x[7], &x[8], freedom, &s) && mixtures_fit(&x[12], &x[8], freedom, &other)
+               && has_account(&s, central) && agree(&x[13], "floors", s.n, 0, 0, 0);
     if (done) {
-        s.scales = x[7].data;
-        s.n_halves = x[8].integers;
-        s.constants = x[9].data;
-        s.floors = x[10].data;
-        s.inverse = 1 / freedom;
+        Contrary windows = {.floors = x[13].data};
         s.central = central;
-        done = look(&s, x[COUNT - 1].data);
+        done = weigh(&s, &other, &windows, x[COUNT - 1].data);
     }
     release(x, COUNT);
     if (!done) return NULL;
@@ -569,7 +638,8 @@ static PyObject *points_on_lines(PyObject *module, PyObject *const *arguments, P
 
 static PyMethodDef functions[] = {
     FUNCTION(filter_systems), FUNCTION(filter_step), FUNCTION(squared_innovations), FUNCTION(smoothed_states),
-    FUNCTION(least_squares), FUNCTION(window_mixtures), FUNCTION(window_evidence), FUNCTION(plain_recordings), FUNCTION(points_on_lines),
+    FUNCTION(least_squares), FUNCTION(window_evidence), FUNCTION(window_ratios),
+    FUNCTION(plain_recordings), FUNCTION(points_on_lines),
     {NULL, NULL, 0, NULL},
 };
 
@@ -773,12 +843,23 @@ INLINE Lane where_seen(Lane x, Lane e)
 }
 
 /* x, but -infinity where it is not above a number */
-INLINE Lane where_above(Lane x, double floor)
+INLINE Lane where_above(Lane x, Lane floor)
 {
-    double numbers[WIDTH];
+    double numbers[WIDTH], floors[WIDTH];
     store(numbers, x);
-    for (int w = 0; w < WIDTH; w++) numbers[w] = numbers[w] > floor ? numbers[w] : -INFINITY;
+    store(floors, floor);
+    for (int w = 0; w < WIDTH; w++) numbers[w] = numbers[w] > floors[w] ? numbers[w] : -INFINITY;
     return load(numbers);
+}
+
+INLINE int any_above(Lane x, Lane floor)
+{
+    double numbers[WIDTH], floors[WIDTH];
+    int any = 0;
+    store(numbers, x);
+    store(floors, floor);
+    for (int w = 0; w < WIDTH; w++) any |= numbers[w] > floors[w];
+    return any;
 }
 
 /* ---- filter_step -------------------------------------------------------------------------------------------------------- */
@@ -1017,15 +1098,15 @@ static void smooth_all(int n, const Series *s, const double *predicted, const do
 
 /* ---- Windows ------------------------------------------------------------------------------------------------------------ */
 
+INLINE Py_ssize_t mapped_at(const Windows *s, Py_ssize_t place) { return place < s->n_mapped ? place : s->n_mapped - 1; }
+
 /* Rows of the maps of some accounts of a place in the order in which they are multiplied: those that each sum adds, by output and
    account, OUTPUTS at a time, column by column as far as they reach. They stay in the cache for all executions. */
-INLINE void pack(const Windows *s, const int64_t *which, Py_ssize_t a, Py_ssize_t first_sum, double **packed, int64_t **extents)
+INLINE void pack(const Windows *s, const int64_t *which, Py_ssize_t a, double *to, int64_t *extent)
 {
     const Py_ssize_t k = s->n_inputs;
-    double *to = *packed;
-    int64_t *extent = *extents;
-    Py_ssize_t begin = first_sum ? s->ends[first_sum - 1] * a : 0;
-    for (Py_ssize_t j = first_sum; j < s->n_sums; j++) {
+    Py_ssize_t begin = 0;
+    for (Py_ssize_t j = 0; j < s->n_sums; j++) {
         const Py_ssize_t end = s->ends[j] * a;
         for (Py_ssize_t i = begin; i < end; i += OUTPUTS) {
             const Py_ssize_t last = i + OUTPUTS < end ? i + OUTPUTS - 1 : end - 1, used = s->reach[last / a];
@@ -1039,8 +1120,6 @@ INLINE void pack(const Windows *s, const int64_t *which, Py_ssize_t a, Py_ssize_
         }
         begin = end;
     }
-    *packed = to;
-    *extents = extent;
 }
 
 /* Adds the squares of some groups of outputs of a window to the sums of as many accounts. */
@@ -1062,6 +1141,16 @@ INLINE const double *square_outputs(const Windows *s, const double *packed, cons
         }
     }
     return packed;
+}
+
+/* The same of the outputs up to the next end, of all accounts or of one. */
+INLINE const double *square_next(const Windows *s, Py_ssize_t j, const double *packed, const int64_t **extents,
+                                 Py_ssize_t n_accounts, double *sums)
+{
+    const Py_ssize_t n_groups = ((s->ends[j] - (j ? s->ends[j - 1] : 0)) * n_accounts + OUTPUTS - 1) / OUTPUTS;
+    const int64_t *own = *extents;
+    *extents += n_groups;
+    return square_outputs(s, packed, own, n_groups, n_accounts, sums);
 }
 
 /* ln sum_a (scale_a (1 + square_a / freedom))^-(n_halves / 2); powers by squaring. */
@@ -1103,17 +1192,21 @@ INLINE Lane log_density(const Windows *s, double scale, Lane square, Py_ssize_t 
     return times(-n_halves / 2.0, logarithm(plus_number(times(scale * s->inverse, square), scale)));
 }
 
+/* WIDTH numbers, or fewer and zeros. */
+INLINE Lane some_of(const double *from, Py_ssize_t width)
+{
+    double some[WIDTH];
+    if (width == WIDTH) return load(from);
+    for (int w = 0; w < WIDTH; w++) some[w] = w < width ? from[w] : 0;
+    return load(some);
+}
+
 /* The windows of some executions at a place. */
 INLINE void gather(const Windows *s, Py_ssize_t place, Py_ssize_t first, Py_ssize_t width)
 {
     const int64_t *rows = s->rows + place * s->n_inputs;
-    for (Py_ssize_t k = 0; k < s->n_inputs; k++) {
-        const double *from = s->values + rows[k] * s->n + first;
-        if (width == WIDTH)
-            store(s->window + k * WIDTH, load(from));
-        else
-            for (int w = 0; w < WIDTH; w++) s->window[k * WIDTH + w] = w < width ? from[w] : 0;
-    }
+    for (Py_ssize_t k = 0; k < s->n_inputs; k++)
+        store(s->window + k * WIDTH, some_of(s->values + rows[k] * s->n + first, width));
 }
 
 INLINE void put(double *to, Lane answer, Py_ssize_t width)
@@ -1127,100 +1220,149 @@ INLINE void put(double *to, Lane answer, Py_ssize_t width)
     memcpy(to, some, width * sizeof(double));
 }
 
-/* What is asked about one place of some executions, up to each end: arrays (wanted, n), one after the other. */
-INLINE void look_at_lane(const Windows *s, Py_ssize_t place, Py_ssize_t mapped, Py_ssize_t first, Py_ssize_t width, double *found)
+/* The least squares at one place of some executions, up to each end: arrays (wanted, n), one after the other. */
+INLINE void look_at_lane(const Windows *s, Py_ssize_t place, Py_ssize_t first, Py_ssize_t width, double *found)
 {
     const Py_ssize_t a = s->n_accounts, n = s->n;
     const double *packed = s->packed;
     const int64_t *extents = s->extents;
     gather(s, place, first, width);
     memset(s->sums, 0, a * WIDTH * sizeof(double));
-    Py_ssize_t begin = 0;
     for (Py_ssize_t j = 0; j < s->n_sums && place < s->wanted[j]; j++) {
-        const Py_ssize_t n_groups = ((s->ends[j] - begin) * a + OUTPUTS - 1) / OUTPUTS;
-        packed = square_outputs(s, packed, extents, n_groups, a, s->sums);
-        extents += n_groups;
-        begin = s->ends[j];
-        const double *scales = s->scales + (mapped * s->n_sums + j) * a;
-        put(found + place * n + first, s->penalties ? least_lane(s) : mix_lane(s, scales, s->n_halves[j]), width);
+        packed = square_next(s, j, packed, &extents, a, s->sums);
+        put(found + place * n + first, least_lane(s), width);
         found += s->wanted[j] * n;
     }
 }
 
-INLINE double highest_of(Lane x, Py_ssize_t width)
+/* ln of the density of all that follows a place up to an end if it is where the place is; `totals` of each degree of freedom and
+   `square` are those up to the end before. */
+INLINE Lane at_rest(const Windows *s, const Contrary *c, Py_ssize_t j, double *totals, Lane *square)
 {
-    double numbers[WIDTH], highest = -INFINITY;
-    store(numbers, x);
-    for (Py_ssize_t w = 0; w < width; w++) highest = numbers[w] > highest ? numbers[w] : highest;
-    return highest;
+    const Py_ssize_t d = c->n_dof, first = s->n_inputs - s->n_outputs, n_points = (s->ends[j] - s->ends[0]) / d;
+    const double *place = s->window + (first + s->ends[0] - d) * WIDTH;
+    for (Py_ssize_t i = first + s->ends[j - 1]; i < first + s->ends[j]; i += d)
+        for (Py_ssize_t k = 0; k < d; k++) {
+            const Lane moved = times(1 / c->stds[k], plus(load(s->window + (i + k) * WIDTH), -1.0, load(place + k * WIDTH)));
+            store(totals + k * WIDTH, plus(load(totals + k * WIDTH), 1.0, moved));
+            *square = plus_product(*square, moved, moved);
+        }
+    Lane distance = *square;
+    for (Py_ssize_t k = 0; k < d; k++)
+        distance = plus_product(distance, times(-1.0 / (n_points + 1), load(totals + k * WIDTH)), load(totals + k * WIDTH));
+    return plus_number(times(-0.5, distance), c->constants[j - 1]);
 }
 
-/* Evidence at one place of some executions, where it is above its floor. What all accounts say is at least what one of them says,
-   so most of them need not be asked: at most places there is none. */
-INLINE void weigh_lane(const Windows *s, Py_ssize_t place, Py_ssize_t mapped, Py_ssize_t first, Py_ssize_t width, double *found)
+/* Evidence for rest at one place of some executions, where it is above its floor. What all accounts say of it is at least what one
+   of them says, and of what came before at most `before`, so most of them need not be asked: at most places there is none. */
+INLINE void weigh_rest(const Windows *s, const Contrary *c, Lane before, Py_ssize_t place, Py_ssize_t first, Py_ssize_t width,
+                       double *found)
 {
-    const Py_ssize_t a = s->n_accounts, n = s->n, before = (s->ends[0] * a + OUTPUTS - 1) / OUTPUTS;
-    const double *scales = s->scales + mapped * s->n_sums * a, *own_packed = s->own;
-    const int64_t *own_extents = s->extents;
-    Py_ssize_t n_asked = 0, begin = s->ends[0];
-    for (Py_ssize_t j = 0, start = 0; j < s->n_sums; start = s->ends[j++])
-        own_extents += ((s->ends[j] - start) * a + OUTPUTS - 1) / OUTPUTS;
+    const Py_ssize_t a = s->n_accounts, n = s->n, mapped = mapped_at(s, place);
+    const double *scales = s->scales + mapped * s->n_sums * a, *floors = c->floors + first, *packed = s->own;
+    const int64_t *extents = s->own_extents;
+    double *totals = s->more, *others = totals + c->n_dof * WIDTH, *most = others + s->n_sums * WIDTH, own[WIDTH] = {0};
+    const Lane zero = times(0.0, before), nothing = plus_number(zero, -INFINITY);
+    Lane square = zero;
+    Py_ssize_t n_ends = 1, n_asked = 0;
     gather(s, place, first, width);
-    memset(s->sums, 0, a * WIDTH * sizeof(double));
-    const double *packed = square_outputs(s, s->packed, s->extents, before, a, s->sums);
-    const int64_t *extents = s->extents + before;
-    const Lane here = mix_lane(s, scales, s->n_halves[0]), nothing = plus_number(times(0.0, here), -INFINITY);
-    double own[WIDTH], *to = found + place * n + first;
-    store(own, load(s->sums + s->central * WIDTH));
-    for (Py_ssize_t j = 1; j < s->n_sums && place < s->wanted[j]; j++, to += s->wanted[j - 1] * n) {
-        const Py_ssize_t n_groups = (s->ends[j] - begin + OUTPUTS - 1) / OUTPUTS;
-        own_packed = square_outputs(s, own_packed, own_extents, n_groups, 1, own);
-        own_extents += n_groups;
-        begin = s->ends[j];
-        double rest[WIDTH] = {0};
-        memcpy(rest, to, width * sizeof(double));
-        const Lane other = plus_number(times(-0.5, load(rest)), s->constants[j - 1]);
-        const Lane least = log_density(s, scales[j * a + s->central], load(own), s->n_halves[j]);
-        const Lane most = plus(plus(other, 1.0, here), -1.0, least);
-        put(to, other, width);
-        if (highest_of(most, width) > s->floors[j - 1]) n_asked = j;
+    memset(totals, 0, c->n_dof * WIDTH * sizeof(double));
+    packed = square_next(s, 0, packed, &extents, 1, own);
+    for (Py_ssize_t j = 1; j < s->n_sums && place < s->wanted[j]; j++, n_ends++) {
+        const Lane other = at_rest(s, c, j, totals, &square);
+        packed = square_next(s, j, packed, &extents, 1, own);
+        store(others + j * WIDTH, other);
+        store(most + j * WIDTH, plus(other, -1.0, log_density(s, scales[j * a + s->central], load(own), s->n_halves[j])));
+        if (any_above(plus(before, 1.0, load(most + j * WIDTH)), some_of(floors + (j - 1) * n, width))) n_asked = j;
     }
-    to = found + place * n + first;
-    begin = s->ends[0];
-    for (Py_ssize_t j = 1; j < s->n_sums && place < s->wanted[j]; j++, to += s->wanted[j - 1] * n) {
+    packed = s->packed;
+    extents = s->extents;
+    if (n_asked) {
+        const Py_ssize_t n_possible = n_asked;
+        memset(s->sums, 0, a * WIDTH * sizeof(double));
+        packed = square_next(s, 0, packed, &extents, a, s->sums);
+        before = mix_lane(s, scales, s->n_halves[0]);
+        n_asked = 0;
+        for (Py_ssize_t j = 1; j <= n_possible; j++)
+            if (any_above(plus(before, 1.0, load(most + j * WIDTH)), some_of(floors + (j - 1) * n, width))) n_asked = j;
+    }
+    double *to = found + place * n + first;
+    for (Py_ssize_t j = 1; j < n_ends; to += s->wanted[j++] * n) {
         Lane answer = nothing;
         if (j <= n_asked) {
-            const Py_ssize_t n_groups = ((s->ends[j] - begin) * a + OUTPUTS - 1) / OUTPUTS;
-            packed = square_outputs(s, packed, extents, n_groups, a, s->sums);
-            extents += n_groups;
-            begin = s->ends[j];
-            double other[WIDTH] = {0};
-            memcpy(other, to, width * sizeof(double));
-            const Lane evidence = plus(plus(load(other), 1.0, here), -1.0, mix_lane(s, scales + j * a, s->n_halves[j]));
-            answer = where_above(evidence, s->floors[j - 1]);
+            packed = square_next(s, j, packed, &extents, a, s->sums);
+            const Lane evidence = plus(plus(load(others + j * WIDTH), 1.0, before), -1.0, mix_lane(s, scales + j * a, s->n_halves[j]));
+            answer = where_above(evidence, some_of(floors + (j - 1) * n, width));
         }
         put(to, answer, width);
     }
 }
 
+/* ln of the mixture of other windows over that of these, at one place of some executions, where it is above its floor. The central
+   account of these, and the beginning of the others, say how large it is at most. */
+INLINE void weigh_windows(const Windows *s, const Contrary *c, Py_ssize_t place, Py_ssize_t first, Py_ssize_t width, double *found)
+{
+    const Windows *other = c->windows;
+    const Py_ssize_t a = s->n_accounts, b = other->n_accounts, last = s->n_sums - 1, n_halves = s->n_halves[last];
+    const double *scales = s->scales + (mapped_at(s, place) * s->n_sums + last) * a;
+    const double *other_scales = other->scales + (mapped_at(other, place) * s->n_sums + last) * b;
+    const Lane floor = some_of(c->floors + first, width);
+    const double *packed = s->own;
+    const int64_t *extents = s->own_extents;
+    double own[WIDTH] = {0};
+    gather(s, place, first, width);
+    for (Py_ssize_t j = 0; j <= last; j++) packed = square_next(s, j, packed, &extents, 1, own);
+    const Lane least = log_density(s, scales[s->central], load(own), n_halves);
+    Lane most = least;
+    packed = other->packed;
+    extents = other->extents;
+    memset(other->sums, 0, b * WIDTH * sizeof(double));
+    for (Py_ssize_t j = 0; j <= last; j++) {
+        packed = square_next(other, j, packed, &extents, b, other->sums);
+        most = mix_lane(other, other_scales, n_halves);
+        if (!any_above(plus(most, -1.0, least), floor)) {
+            put(found + place * s->n + first, plus_number(times(0.0, load(s->window)), -INFINITY), width);
+            return;
+        }
+    }
+    packed = s->packed;
+    extents = s->extents;
+    memset(s->sums, 0, a * WIDTH * sizeof(double));
+    for (Py_ssize_t j = 0; j <= last; j++) packed = square_next(s, j, packed, &extents, a, s->sums);
+    put(found + place * s->n + first, where_above(plus(most, -1.0, mix_lane(s, scales, n_halves)), floor), width);
+}
+
+/* The maps of all accounts of a place, and if they are asked for those of the central one alone. */
+INLINE void pack_place(const Windows *s, Py_ssize_t place, int has_own)
+{
+    const int64_t *which = s->which + mapped_at(s, place) * s->n_accounts;
+    pack(s, which, s->n_accounts, s->packed, s->extents);
+    if (has_own) pack(s, which + s->central, 1, s->own, s->own_extents);
+}
+
 static void look_at_windows(const Windows *s, double *found)
 {
     for (Py_ssize_t place = 0; place < s->wanted[0]; place++) {
-        const Py_ssize_t mapped = place < s->n_mapped ? place : s->n_mapped - 1;
-        const int64_t *which = s->which + mapped * s->n_accounts;
-        double *packed = s->packed;
-        int64_t *extents = s->extents;
-        pack(s, which, s->n_accounts, 0, &packed, &extents);
-        if (s->constants) {
-            packed = s->own;
-            pack(s, which + s->central, 1, 1, &packed, &extents);
-        }
+        pack_place(s, place, 0);
+        for (Py_ssize_t first = 0; first < s->n; first += WIDTH)
+            look_at_lane(s, place, first, s->n - first < WIDTH ? s->n - first : WIDTH, found);
+    }
+}
+
+static void weigh_all(const Windows *s, const Contrary *c, double *found)
+{
+    for (Py_ssize_t place = 0; place < s->wanted[0]; place++) {
+        pack_place(s, place, 1);
+        if (c->windows) pack_place(c->windows, place, 0);
+        memset(s->sums, 0, s->n_accounts * WIDTH * sizeof(double));
+        /* Of what came before a place, were it all as expected. */
+        const Lane most = mix_lane(s, s->scales + mapped_at(s, place) * s->n_sums * s->n_accounts, s->n_halves[0]);
         for (Py_ssize_t first = 0; first < s->n; first += WIDTH) {
             const Py_ssize_t width = s->n - first < WIDTH ? s->n - first : WIDTH;
-            if (s->constants)
-                weigh_lane(s, place, mapped, first, width, found);
+            if (c->windows)
+                weigh_windows(s, c, place, first, width, found);
             else
-                look_at_lane(s, place, mapped, first, width, found);
+                weigh_rest(s, c, most, place, first, width, found);
         }
     }
 }

@@ -14,7 +14,7 @@ from probdmp.gaussian._recordings_numpy import (
     points_on_lines,
     split_sums,
     window_evidence,
-    window_mixtures,
+    window_ratios,
 )
 
 __all__ = [
@@ -27,7 +27,7 @@ __all__ = [
     "split_sums",
     "squared_innovations",
     "window_evidence",
-    "window_mixtures",
+    "window_ratios",
 ]
 
 LOG_2PI = float(np.log(2 * np.pi))

@@ -7,7 +7,7 @@ import numpy as np
 
 from probdmp.checks import FloatArray, IntArray
 
-__all__ = ["least_squares", "plain_recordings", "points_on_lines", "split_sums", "window_evidence", "window_mixtures"]
+__all__ = ["least_squares", "plain_recordings", "points_on_lines", "split_sums", "window_evidence", "window_ratios"]
 
 FEW = 16
 """Executions up to which all places are multiplied at once: then the calls cost more than the numbers."""
@@ -114,33 +114,6 @@ def _squares(
     return sums
 
 
-def window_mixtures(
-    values: FloatArray,
-    rows: IntArray,
-    maps: FloatArray,
-    which: IntArray,
-    ends: IntArray,
-    reach: IntArray,
-    wanted: IntArray,
-    scales: FloatArray,
-    n_halves: IntArray,
-    found: FloatArray,
-    freedom: float,
-) -> None:
-    """ln sum_a (scale_a (1 + square_a / freedom))^-(n_halves / 2) of such sums of squares, over the accounts.
-
-    Parameters
-    ----------
-    scales : (P, J, A) array, of each place and sum.
-    n_halves : (J)
-    found : written: J arrays (wanted, n), one after the other.
-    """
-    sums, mixtures = _squares(values, rows, maps, which, ends, reach, wanted), split_sums(found, wanted, values.shape[1])
-    for j, (some, mixed) in enumerate(zip(sums, mixtures, strict=True)):
-        own = scales[np.minimum(np.arange(len(some)), len(scales) - 1), j]
-        _mix(some, own, mixed, int(n_halves[j]), freedom)
-
-
 def window_evidence(
     values: FloatArray,
     rows: IntArray,
@@ -151,38 +124,108 @@ def window_evidence(
     wanted: IntArray,
     scales: FloatArray,
     n_halves: IntArray,
+    stds: FloatArray,
     constants: FloatArray,
     floors: FloatArray,
     found: FloatArray,
     freedom: float,
     central: int,
 ) -> None:
-    """Evidence for another account of what comes after the first part of a window: ln p(all | other) - ln p(all) + ln p(first).
+    """Evidence that all that follows the first end is at rest: ln p(all | at rest) - ln p(all) + ln p(first).
 
-    p are the mixtures of `window_mixtures`, the last one up to the first end. What is not above its floor is -infinity.
+    p are mixtures sum_a (scale_a (1 + square_a / freedom))^-(n_halves / 2) over the accounts, the last one up to the first end.
+    A window ends with as many numbers as there are outputs, points of D numbers; at rest, those after the first end are the
+    last one before it and white noise, which that one has too. What is not above its floor is -infinity.
 
     Parameters
     ----------
-    constants, floors : (J - 1) of the other account, whose ln p is constant - square / 2.
-    found : written: J - 1 arrays (wanted, n), one after the other; holds these squares before.
+    scales : (P, J, A) array, of each place and sum.
+    n_halves : (J)
+    stds : (D,) array, of the noise.
+    constants : (J - 1) logarithms of the density at rest where it is largest.
+    floors : (J - 1, n) array.
+    found : written: J - 1 arrays (wanted, n), one after the other.
     central : the account that is asked first.
     """
-    mixtures = np.empty(int(wanted.sum()) * values.shape[1])
-    window_mixtures(values, rows, maps, which, ends, reach, wanted, scales, n_halves, mixtures, freedom)
-    here, *together = split_sums(mixtures, wanted, values.shape[1])
-    of_each = zip(split_sums(found, wanted[1:], values.shape[1]), together, constants, floors, strict=True)
-    for some, mixed, constant, floor in of_each:
-        some *= -0.5
-        some += constant
-        some += here[: len(some)]
-        some -= mixed
+    here, *together = _mixtures(values, rows, maps, which, ends, reach, wanted, scales, n_halves, freedom)
+    n = values.shape[1]
+    first, d = rows.shape[1] - maps.shape[1], len(stds)
+    since, end = first + int(ends[0]) - d, first + int(ends[-1])
+    points = values[rows[: len(here), since:end]].reshape(len(here), (end - since) // d, d, n)
+    moved = (points[:, 1:] - points[:, :1]) / stds[:, None]
+    of_each = zip(split_sums(found, wanted[1:], n), together, constants, floors, (ends[1:] - ends[0]) // d, strict=True)
+    for some, mixed, constant, floor, n_points in of_each:
+        own = moved[: len(some), :n_points]
+        squares = np.sum(own * own, axis=1) - np.sum(own, axis=1) ** 2 / (n_points + 1)
+        some[:] = constant - squares.sum(axis=1) / 2 + here[: len(some)] - mixed
         some[some <= floor] = -np.inf
+
+
+def window_ratios(
+    values: FloatArray,
+    rows: IntArray,
+    maps: FloatArray,
+    which: IntArray,
+    ends: IntArray,
+    reach: IntArray,
+    wanted: IntArray,
+    scales: FloatArray,
+    n_halves: IntArray,
+    other_maps: FloatArray,
+    other_which: IntArray,
+    other_reach: IntArray,
+    other_scales: FloatArray,
+    floors: FloatArray,
+    found: FloatArray,
+    freedom: float,
+    central: int,
+) -> None:
+    """Evidence for other windows: ln p'(all) - ln p(all), mixtures up to the last end; not above its floor it is -infinity.
+
+    Parameters
+    ----------
+    other_maps, other_which, other_reach, other_scales : of p'.
+    floors : (n,) array.
+    found : written: a single array (wanted, n).
+    central : the account that is asked first.
+    """
+    last, ratios = slice(len(ends) - 1, None), found.reshape(-1, values.shape[1])
+    (together,), (other,) = (
+        _mixtures(values, rows, own, of_places, ends[last], used, wanted[last], bases[:, last], n_halves[last], freedom)
+        for own, of_places, used, bases in (
+            (maps, which, reach, scales),
+            (other_maps, other_which, other_reach, other_scales),
+        )
+    )
+    np.subtract(other, together, out=ratios)
+    ratios[ratios <= floors] = -np.inf
 
 
 def split_sums(found: FloatArray, wanted: IntArray, n: int) -> list[FloatArray]:
     """The J arrays (wanted, n) that are written one after the other."""
     ends = np.cumsum(wanted * n).tolist()
     return [found[end - count * n : end].reshape(count, n) for end, count in zip(ends, wanted.tolist(), strict=True)]
+
+
+def _mixtures(
+    values: FloatArray,
+    rows: IntArray,
+    maps: FloatArray,
+    which: IntArray,
+    ends: IntArray,
+    reach: IntArray,
+    wanted: IntArray,
+    scales: FloatArray,
+    n_halves: IntArray,
+    freedom: float,
+) -> list[FloatArray]:
+    """ln sum_a (scale_a (1 + square_a / freedom))^-(n_halves / 2) of squares, over the accounts: J arrays (wanted, n)."""
+    sums = _squares(values, rows, maps, which, ends, reach, wanted)
+    mixtures = [np.empty((len(some), values.shape[1])) for some in sums]
+    for j, (some, mixed) in enumerate(zip(sums, mixtures, strict=True)):
+        own = scales[np.minimum(np.arange(len(some)), len(scales) - 1), j]
+        _mix(some, own, mixed, int(n_halves[j]), freedom)
+    return mixtures
 
 
 def _mix(squares: FloatArray, scales: FloatArray, mixed: FloatArray, n_halves: int, freedom: float) -> None:

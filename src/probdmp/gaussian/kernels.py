@@ -25,7 +25,7 @@ __all__ = [
     "split_sums",
     "squared_innovations",
     "window_evidence",
-    "window_mixtures",
+    "window_ratios",
 ]
 
 
@@ -56,8 +56,8 @@ filter_step: Callable[..., int] = _kernels.filter_step
 squared_innovations: Callable[..., None] = _kernels.squared_innovations
 smoothed_states: Callable[..., None] = _kernels.smoothed_states
 least_squares: Callable[..., None] = _kernels.least_squares
-window_mixtures: Callable[..., None] = _kernels.window_mixtures
 window_evidence: Callable[..., None] = _kernels.window_evidence
+window_ratios: Callable[..., None] = _kernels.window_ratios
 plain_recordings: Callable[..., None] = _kernels.plain_recordings
 points_on_lines: Callable[..., None] = _kernels.points_on_lines
 split_sums = _kernels_numpy.split_sums
