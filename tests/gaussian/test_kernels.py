@@ -362,6 +362,39 @@ def test_rest_that_does_not_belong_to_windows_is_refused(fault):
         weigh()
 
 
+@given(st.integers(1, 40), st.integers(0, 19), seeds, st.sampled_from([1.0, 1e-9, 1e9]))
+def test_residuals_of_small_gaussians_are_whitened_as_by_their_cholesky_factors(size, count, seed, scale):
+    rng = np.random.default_rng(seed)
+    factors = np.tril(rng.normal(size=(count, size, size)), -1) * 0.3 / np.sqrt(size) + np.eye(size)
+    factors *= scale * np.exp(rng.normal(size=(count, size, 1)))
+    white, residuals = rng.normal(size=(2, count, size))
+    residuals = np.matmul(factors, white[..., None])[..., 0]
+    covariances = np.matmul(factors, factors.mT)
+    for module in {_kernels_numpy, _compiled() if kernels.COMPILED else _kernels_numpy}:
+        found, diagonals = np.full((2, count, size), -7.0)
+        assert module.whiten(covariances, residuals, found, diagonals)
+        np.testing.assert_allclose(found, white, rtol=0, atol=1e-12 * (1 + np.abs(white).max(initial=0)))
+        np.testing.assert_allclose(diagonals, np.diagonal(factors, axis1=1, axis2=2), rtol=1e-12)
+
+
+@pytest.mark.parametrize("entry", [0.0, -1.0, np.nan])
+@pytest.mark.parametrize("which", range(10))
+def test_of_what_is_not_positive_definite_is_said_so(which, entry):
+    covariances = np.tile(np.eye(3), (10, 1, 1))
+    covariances[which, 1, 1] = entry
+    for module in {_kernels_numpy, _compiled() if kernels.COMPILED else _kernels_numpy}:
+        assert not module.whiten(covariances, np.ones((10, 3)), np.empty((10, 3)), np.empty((10, 3)))
+
+
+@needs_extension
+@pytest.mark.parametrize("fault", range(4))
+def test_matrices_and_residuals_of_different_sizes_are_refused(fault):
+    shapes = [(2, 3, 3), (2, 3), (2, 3), (2, 3)]
+    shapes[fault] = (*shapes[fault][:-1], 4)
+    with pytest.raises(ValueError, match="expected"):
+        _compiled().whiten(*(np.ones(shape) for shape in shapes))
+
+
 @needs_extension
 @pytest.mark.parametrize("square", [0.0, 1e-300, 1e-30, 1.0, 2.0, 1e30, 1e280])
 def test_logarithms_of_mixtures_are_those_of_the_library(square):

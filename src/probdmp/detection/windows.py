@@ -16,6 +16,7 @@ from probdmp.checks import FloatArray, IntArray
 from probdmp.detection.path_model import PathModel
 from probdmp.detection.phase_clock import TICKS
 from probdmp.detection.window_maps import WindowInputs, linear_maps
+from probdmp.gaussian import kernels
 
 __all__ = ["PathWindows", "WhiteWindows", "gather", "inverse_of_cholesky", "whitened"]
 
@@ -50,17 +51,13 @@ def inverse_of_cholesky(covariances: FloatArray) -> FloatArray:
 
 
 def whitened(covariances: FloatArray, residuals: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """L^-1 r of positive definite matrices L L^T (…, n, n) and residuals (…, n), and the logarithms of the diagonals of L.
-
-    One more row under the matrix makes the factorisation find it on its way: the last row of its factor is (L^-1 r)^T.
-    """
+    """L^-1 r of positive definite matrices L L^T (…, n, n) and residuals (…, n), and the logarithms of the diagonals of L."""
     size = residuals.shape[-1]
-    bordered = np.empty((*residuals.shape[:-1], size + 1, size + 1))
-    bordered[..., :size, :size], bordered[..., size, :size] = covariances, residuals
-    bordered[..., :size, size], bordered[..., size, size] = residuals, np.finfo(np.float64).max / 4  # larger than any square
-    factors = np.linalg.cholesky(bordered)
-    diagonals = np.diagonal(factors, axis1=-2, axis2=-1)[..., :size]
-    return factors[..., size, :size], np.log(diagonals)
+    white, diagonals = np.empty((2, *residuals.shape))
+    flat = (np.ascontiguousarray(array).reshape(-1, *array.shape[residuals.ndim - 1 :]) for array in (covariances, residuals))
+    if not kernels.whiten(*flat, white.reshape(-1, size), diagonals.reshape(-1, size)):
+        raise np.linalg.LinAlgError("Matrix is not positive definite")
+    return white, np.log(diagonals)
 
 
 def _invert_triangles(factors: FloatArray, inverses: FloatArray) -> None:

@@ -223,6 +223,11 @@ typedef struct {
 #define weigh_all NAMED(weigh_all)
 #define look_at_windows NAMED(look_at_windows)
 
+#define minus_product NAMED(minus_product)
+#define root NAMED(root)
+#define factorise_lane NAMED(factorise_lane)
+#define whiten_all NAMED(whiten_all)
+
 #define look_for_odd NAMED(look_for_odd)
 #define draw_lines NAMED(draw_lines)
 
@@ -247,6 +252,7 @@ static void look_at_processor(void) {}
 #undef filter_all
 #undef look_at_windows
 #undef weigh_all
+#undef whiten_all
 #undef look_for_odd
 #undef draw_lines
 #undef step_all
@@ -583,6 +589,34 @@ static PyObject *window_ratios(PyObject *module, PyObject *const *arguments, Py_
     Py_RETURN_NONE;
 }
 
+/* ---- Small matrices ----------------------------------------------------------------------------------------------------- */
+
+static PyObject *whiten(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
+{
+    static const Spec specs[] = {
+        {"covariances", 0, 3, 0}, {"residuals", 0, 2, 0}, {"white", 1, 2, 0}, {"diagonals", 1, 2, 0},
+    };
+    enum { COUNT = sizeof(specs) / sizeof(specs[0]) };
+    Array x[COUNT];
+    if (take(arguments, given, specs, COUNT, x) < 0) return NULL;
+    const Py_ssize_t count = x[1].view.shape[0], n = x[1].view.shape[1];
+    int is_positive = 0, done = agree(&x[0], "covariances", count, n, n, 0) && agree(&x[2], "white", count, n, 0, 0)
+                                && agree(&x[3], "diagonals", count, n, 0, 0);
+    if (done) {
+        double *work = malloc((n * (n + 1) / 2 + n + 1) * WIDTH * sizeof(double));
+        done = work != NULL;
+        if (done) {
+            Py_BEGIN_ALLOW_THREADS
+            is_positive = CHOOSE(whiten_all)(count, n, x[0].data, x[1].data, work, x[2].data, x[3].data);
+            Py_END_ALLOW_THREADS
+        } else
+            PyErr_NoMemory();
+        free(work);
+    }
+    release(x, COUNT);
+    return done ? PyBool_FromLong(is_positive) : NULL;
+}
+
 /* ---- Recordings --------------------------------------------------------------------------------------------------------- */
 
 static PyObject *plain_recordings(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
@@ -638,7 +672,7 @@ static PyObject *points_on_lines(PyObject *module, PyObject *const *arguments, P
 
 static PyMethodDef functions[] = {
     FUNCTION(filter_systems), FUNCTION(filter_step), FUNCTION(squared_innovations), FUNCTION(smoothed_states),
-    FUNCTION(least_squares), FUNCTION(window_evidence), FUNCTION(window_ratios),
+    FUNCTION(least_squares), FUNCTION(window_evidence), FUNCTION(window_ratios), FUNCTION(whiten),
     FUNCTION(plain_recordings), FUNCTION(points_on_lines),
     {NULL, NULL, 0, NULL},
 };
@@ -784,6 +818,21 @@ INLINE Lane plus_product(Lane sum, Lane x, Lane y)
 {
     UNROLL for (int i = 0; i < PARTS; i++) sum.part[i] += x.part[i] * y.part[i];
     return sum;
+}
+
+/* sum - x y */
+INLINE Lane minus_product(Lane sum, Lane x, Lane y)
+{
+    UNROLL for (int i = 0; i < PARTS; i++) sum.part[i] -= x.part[i] * y.part[i];
+    return sum;
+}
+
+INLINE Lane root(Lane x)
+{
+    double numbers[WIDTH];
+    store(numbers, x);
+    for (int w = 0; w < WIDTH; w++) numbers[w] = sqrt(numbers[w]);
+    return load(numbers);
 }
 
 INLINE Lane plus_number(Lane x, double number)
@@ -1163,12 +1212,7 @@ INLINE Lane mix_lane(const Windows *s, const double *scales, Py_ssize_t n_halves
     for (Py_ssize_t a = 0; a < s->n_accounts; a++) {
         const Lane own = plus_number(times(scales[a] * s->inverse, load(s->sums + a * WIDTH)), scales[a]);
         Lane base = quotient(least, own), power = one;
-        if (n_halves % 2) {
-            double roots[WIDTH];
-            store(roots, base);
-            for (int w = 0; w < WIDTH; w++) roots[w] = sqrt(roots[w]);
-            power = load(roots);
-        }
+        if (n_halves % 2) power = root(base);
         for (Py_ssize_t e = n_halves / 2; e; e /= 2) {
             if (e % 2) power = plus_product(zero, power, base);
             base = plus_product(zero, base, base);
@@ -1365,6 +1409,52 @@ static void weigh_all(const Windows *s, const Contrary *c, double *found)
                 weigh_rest(s, c, most, place, first, width, found);
         }
     }
+}
+
+/* ---- Small matrices ----------------------------------------------------------------------------------------------------- */
+
+/* L and L^-1 r of WIDTH matrices L L^T, row by row, in place: of the lower triangle, and of r. */
+INLINE void factorise_lane(Py_ssize_t n, double *triangle, double *residual)
+{
+    const Lane zero = times(0.0, load(residual)), one = plus_number(zero, 1.0);
+    for (Py_ssize_t i = 0; i <= n; i++) { /* r is one more row */
+        double *row = i < n ? triangle + i * (i + 1) / 2 * WIDTH : residual;
+        for (Py_ssize_t j = 0; j < (i < n ? i : n); j++) {
+            const double *above = triangle + j * (j + 1) / 2 * WIDTH;
+            Lane sum = load(row + j * WIDTH);
+            for (Py_ssize_t k = 0; k < j; k++) sum = minus_product(sum, load(row + k * WIDTH), load(above + k * WIDTH));
+            store(row + j * WIDTH, plus_product(zero, sum, load(above + j * WIDTH)));
+        }
+        if (i == n) break;
+        Lane sum = load(row + i * WIDTH);
+        for (Py_ssize_t k = 0; k < i; k++) sum = minus_product(sum, load(row + k * WIDTH), load(row + k * WIDTH));
+        store(row + i * WIDTH, quotient(one, root(sum))); /* one over the diagonal */
+    }
+}
+
+/* Whether all matrices are positive definite; else what is written is not to be used. */
+static int whiten_all(Py_ssize_t count, Py_ssize_t n, const double *covariances, const double *residuals, double *work, double *white,
+                      double *diagonals)
+{
+    double *triangle = work, *residual = work + n * (n + 1) / 2 * WIDTH;
+    int is_positive = 1;
+    for (Py_ssize_t first = 0; first < count; first += WIDTH) {
+        for (int w = 0; w < WIDTH; w++) {
+            const Py_ssize_t own = first + w < count ? first + w : first;
+            for (Py_ssize_t i = 0, at = 0; i < n; i++)
+                for (Py_ssize_t j = 0; j <= i; j++, at++) triangle[at * WIDTH + w] = covariances[(own * n + i) * n + j];
+            for (Py_ssize_t i = 0; i < n; i++) residual[i * WIDTH + w] = residuals[own * n + i];
+        }
+        factorise_lane(n, triangle, residual);
+        for (int w = 0; w < WIDTH && first + w < count; w++)
+            for (Py_ssize_t i = 0; i < n; i++) {
+                const double diagonal = 1 / triangle[(i * (i + 1) / 2 + i) * WIDTH + w];
+                white[(first + w) * n + i] = residual[i * WIDTH + w];
+                diagonals[(first + w) * n + i] = diagonal;
+                is_positive &= diagonal > 0 && diagonal < INFINITY;
+            }
+    }
+    return is_positive;
 }
 
 /* ---- Recordings --------------------------------------------------------------------------------------------------------- */

@@ -13,6 +13,7 @@ from probdmp.gaussian._recordings_numpy import (
     plain_recordings,
     points_on_lines,
     split_sums,
+    whiten,
     window_evidence,
     window_ratios,
 )
@@ -26,6 +27,7 @@ __all__ = [
     "smoothed_states",
     "split_sums",
     "squared_innovations",
+    "whiten",
     "window_evidence",
     "window_ratios",
 ]

@@ -7,7 +7,7 @@ import numpy as np
 
 from probdmp.checks import FloatArray, IntArray
 
-__all__ = ["least_squares", "plain_recordings", "points_on_lines", "split_sums", "window_evidence", "window_ratios"]
+__all__ = ["least_squares", "plain_recordings", "points_on_lines", "split_sums", "whiten", "window_evidence", "window_ratios"]
 
 FEW = 16
 """Executions up to which all places are multiplied at once: then the calls cost more than the numbers."""
@@ -199,6 +199,29 @@ def window_ratios(
     )
     np.subtract(other, together, out=ratios)
     ratios[ratios <= floors] = -np.inf
+
+
+def whiten(covariances: FloatArray, residuals: FloatArray, white: FloatArray, diagonals: FloatArray) -> bool:
+    """Residuals of small Gaussians as white noise, L^-1 r of covariances L L^T; whether all of these are positive definite.
+
+    One more row under the matrix makes the factorisation find it on its way: the last row of its factor is (L^-1 r)^T.
+
+    Parameters
+    ----------
+    covariances, residuals : (U, n, n) and (U, n) arrays; of the first only the lower triangle is looked at.
+    white : written, (U, n).
+    diagonals : of L, written, (U, n).
+    """
+    count, size = residuals.shape
+    bordered = np.empty((count, size + 1, size + 1))
+    bordered[:, :size, :size], bordered[:, size, :size] = covariances, residuals
+    bordered[:, :size, size], bordered[:, size, size] = residuals, np.finfo(np.float64).max / 4  # larger than any square
+    try:
+        factors = np.linalg.cholesky(bordered)
+    except np.linalg.LinAlgError:
+        return False
+    white[:], diagonals[:] = factors[:, size, :size], np.diagonal(factors, axis1=1, axis2=2)[:, :size]
+    return bool(np.isfinite(diagonals).all())
 
 
 def split_sums(found: FloatArray, wanted: IntArray, n: int) -> list[FloatArray]:

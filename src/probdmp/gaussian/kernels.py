@@ -24,6 +24,7 @@ __all__ = [
     "smoothed_states",
     "split_sums",
     "squared_innovations",
+    "whiten",
     "window_evidence",
     "window_ratios",
 ]
@@ -58,6 +59,7 @@ smoothed_states: Callable[..., None] = _kernels.smoothed_states
 least_squares: Callable[..., None] = _kernels.least_squares
 window_evidence: Callable[..., None] = _kernels.window_evidence
 window_ratios: Callable[..., None] = _kernels.window_ratios
+whiten: Callable[..., bool] = _kernels.whiten
 plain_recordings: Callable[..., None] = _kernels.plain_recordings
 points_on_lines: Callable[..., None] = _kernels.points_on_lines
 split_sums = _kernels_numpy.split_sums
