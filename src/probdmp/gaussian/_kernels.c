@@ -903,12 +903,15 @@ INLINE Lane where_above(Lane x, Lane floor)
 
 INLINE int any_above(Lane x, Lane floor)
 {
-    double numbers[WIDTH], floors[WIDTH];
-    int any = 0;
-    store(numbers, x);
-    store(floors, floor);
-    for (int w = 0; w < WIDTH; w++) any |= numbers[w] > floors[w];
-    return any;
+#ifdef MASK
+    MASK above = x.part[0] > floor.part[0];
+    UNROLL for (int i = 1; i < PARTS; i++) above |= x.part[i] > floor.part[i];
+    return (above[0] | above[1] | above[2] | above[3]) != 0;
+#else
+    int above = 0;
+    for (int i = 0; i < PARTS; i++) above |= x.part[i] > floor.part[i];
+    return above;
+#endif
 }
 
 /* ---- filter_step -------------------------------------------------------------------------------------------------------- */
