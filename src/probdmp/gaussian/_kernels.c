@@ -31,7 +31,7 @@
 
 #define MOST_STATES 4
 #define OUTPUTS 4 /* rows of maps that are multiplied with a window at once */
-#define TILE 512 /* observations of each that are brought side by side at a time */
+#define TILE 128 /* observations of each that are brought side by side at a time */
 #define LARGEST_MAGNITUDE 1e100 /* see checks.py */
 #define LOG_2PI 1.8378770664093453
 
@@ -109,6 +109,13 @@ static int few_states(Py_ssize_t n)
     case 3: BODY(3); break;                                                                                                   \
     case 4: BODY(4); break;                                                                                                   \
     }
+
+/* A line of the cache, or of nothing. */
+#if defined(__GNUC__)
+#define fetch(address) __builtin_prefetch(address)
+#else
+#define fetch(address) (void)(address)
+#endif
 
 /* Series side by side, in the registers of the processor where the compiler has a type for them. */
 #if defined(__GNUC__)
@@ -892,8 +899,6 @@ INLINE void bring_together(const Series *s, Py_ssize_t first, Py_ssize_t start, 
     for (; i + 4 <= length; i += 4)
         for (int part = 0; part < PARTS; part++) {
             Vector x[4];
-            if (i % 8 == 0) /* a cache line of the series that are next: rows are too short for the processor to guess it */
-                for (int w = 0; w < 4; w++) __builtin_prefetch(o[4 * part + w] + i + WIDTH * size);
             UNROLL for (int w = 0; w < 4; w++)
                 x[w] = *(const Anywhere *)(o[4 * part + w] + i) - *(const Anywhere *)(path[4 * part + w] + i);
             const Vector a = SHUFFLE(x[0], x[1], 0, 4, 2, 6), b = SHUFFLE(x[0], x[1], 1, 5, 3, 7);
@@ -915,26 +920,30 @@ INLINE Lane innovation_of(int n, const double *c, Lane y, const Lane *d)
     return y;
 }
 
+/* Each next state waits for n operations after the last ones: compilers fuse the first product here with the sum, so that the
+   other, which does not wait for the state, begins it. */
 INLINE void go_on(int n, const double *closed, const double *feedback, Lane y, Lane *d)
 {
     Lane next[MOST_STATES];
     UNROLL for (int i = 0; i < n; i++) {
-        next[i] = times(feedback[i], y);
-        UNROLL for (int k = 0; k < n; k++) next[i] = plus(next[i], closed[i * n + k], d[k]);
+        next[i] = plus(times(closed[i * n], d[0]), feedback[i], y);
+        UNROLL for (int k = 1; k < n; k++) next[i] = plus(next[i], closed[i * n + k], d[k]);
     }
     UNROLL for (int i = 0; i < n; i++) d[i] = next[i];
 }
 
+/* Goes on with the sums of one degree of freedom of WIDTH series. Meanwhile those of the series that follow, which are as many
+   numbers, one after the other, are fetched from memory: their rows are too short for the processor to guess it. */
 INLINE void score_tile(int n, const Series *s, Py_ssize_t dof, Py_ssize_t start, Py_ssize_t steps, const double *tile,
-                       double *state, double *sums)
+                       const double *following, double *state, double *sums)
 {
     Lane d[MOST_STATES], sum = load(sums);
     UNROLL for (int i = 0; i < n; i++) d[i] = load(state + i * WIDTH);
     for (Py_ssize_t t = 0; t < steps; t++) {
         const Py_ssize_t here = (start + t) * s->n_dof + dof;
         const Lane y = load(tile + (t * s->n_dof + dof) * WIDTH), e = innovation_of(n, s->sensor + dof * n, y, d);
-        const Lane weighted = times(s->precisions[here], e);
-        UNROLL for (int i = 0; i < PARTS; i++) sum.part[i] += weighted.part[i] * e.part[i];
+        sum = plus_product(sum, times(s->precisions[here], e), e);
+        fetch(following + here * WIDTH);
         go_on(n, s->closed + here * n * n, s->feedback + here * n, y, d);
     }
     UNROLL for (int i = 0; i < n; i++) store(state + i * WIDTH, d[i]);
@@ -947,12 +956,13 @@ static void score_all(int n, const Series *s, double *tile, double *state, doubl
     const Py_ssize_t d = s->n_dof, longest = d < TILE ? TILE / d : 1;
     double *sums = state + d * n * WIDTH;
     for (Py_ssize_t first = 0; first < s->n_series; first += WIDTH) {
+        const double *following = s->observed + (first + WIDTH) * s->n_times * d;
         memset(state, 0, d * (n + 1) * WIDTH * sizeof(double));
         for (Py_ssize_t start = 0; start < s->n_times; start += longest) {
             const Py_ssize_t steps = s->n_times - start < longest ? s->n_times - start : longest;
             bring_together(s, first, start, steps, tile);
             for (Py_ssize_t dof = 0; dof < d; dof++) {
-#define BODY(k) score_tile(k, s, dof, start, steps, tile, state + dof * n * WIDTH, sums + dof * WIDTH)
+#define BODY(k) score_tile(k, s, dof, start, steps, tile, following, state + dof * n * WIDTH, sums + dof * WIDTH)
                 WITH_STATES(n, BODY)
 #undef BODY
             }
