@@ -13,7 +13,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from probdmp.gaussian import _kernels_numpy, kernels
+from probdmp.gaussian import LinearGaussianModel, _kernels_numpy, kernels, shared_gains
 
 needs_extension = pytest.mark.skipif(not kernels.COMPILED, reason="probdmp.gaussian._kernels was not built, or is not wanted")
 
@@ -161,7 +161,7 @@ def test_what_cannot_be_squared_is_refused_before_anything_is_written(module, va
 def series(draw):
     """Closed loop, feedback, sensor, precisions, observations and paths of N series, as the kernels take them."""
     rng = np.random.default_rng(draw(seeds))
-    n_series, t = draw(st.integers(0, 20)), draw(st.integers(1, 80))
+    n_series, t = draw(st.integers(0, 20)), draw(st.integers(1, 80) | st.sampled_from([129, 2000]))
     d, n = draw(st.integers(1, 30)), draw(st.integers(1, kernels.MOST_STATES))
     closed = rng.normal(size=(t, d, n, n))
     closed *= 0.9 / np.linalg.norm(closed, axis=(2, 3), keepdims=True)
@@ -195,6 +195,39 @@ def test_series_are_smoothed_alike(arguments, seed):
     _compiled().smoothed_states(*arguments, covariances, states, ours)
     _kernels_numpy.smoothed_states(*arguments, covariances, states, plain)
     assert_same(ours, plain)
+
+
+@needs_extension
+@pytest.mark.parametrize("n_dof", [1, 7, 30])
+@pytest.mark.parametrize("n_times", [1, 31, 32, 33, 65, 2000])
+def test_shortest_and_longest_series_of_movements_are_alike(n_times, n_dof):
+    """Sensors and motions from very precise to very coarse; nine series, one more than the compiled kernels take at once."""
+    rng = np.random.default_rng(n_times)
+    model = LinearGaussianModel(
+        np.array([[0.0, -25.0, -156.0], [0.0, 0.875, -0.78], [0.0, 0.0044, 0.9961]]),
+        np.array([[1.0], [0.005], [0.000025]]),
+        rng.normal(size=(n_times - 1, n_dof, 1)),
+        10.0 ** rng.uniform(-8, 4, (n_times - 1, n_dof, 1, 1)),
+        np.array([[0.0, 0.0, 1.0]]),
+        10.0 ** rng.uniform(-12, 2, (n_dof, 1, 1)),
+        np.zeros((n_dof, 3)),
+        np.zeros((n_dof, 3, 3)),
+    )
+    gains = shared_gains(model)
+    observations = gains.path + rng.normal(size=(9, n_times, n_dof))
+    observations[4, n_times // 2, 0] = np.nan
+    squares = np.empty((2, 9, n_dof))
+    for module, own in zip((_compiled(), _kernels_numpy), squares, strict=True):
+        module.squared_innovations(*gains.recursion, observations, gains.path[None], own)
+    assert np.isnan(squares[:, 4, 0]).all()
+    np.testing.assert_allclose(*squares, rtol=1e-12)
+    shared = gains.closed_loop, gains.feedback, gains.systems.sensor, gains.precisions
+    complete, smoothed = np.nan_to_num(observations), np.empty((2, 9, n_times, n_dof, 3))
+    for module, own in zip((_compiled(), _kernels_numpy), smoothed, strict=True):
+        module.smoothed_states(*shared, complete, gains.path[None], gains.predicted_covariances, gains.path_states, own)
+    k = np.max(1 / (gains.precisions * gains.systems.noise), axis=0)  # see assert_filtered_alike
+    difference = np.abs(smoothed[0] - smoothed[1]).max(axis=(0, 1))
+    assert np.all(difference <= np.maximum(1e-12, 1e-14 * k[:, None]) * np.abs(smoothed[1]).max(axis=(0, 1)))
 
 
 @st.composite

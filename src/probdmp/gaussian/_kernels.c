@@ -31,7 +31,7 @@
 
 #define MOST_STATES 4
 #define OUTPUTS 4 /* rows of maps that are multiplied with a window at once */
-#define TILE 512 /* observations of each that are brought side by side at a time */
+#define TILE 64 /* observations of each that are brought side by side at a time */
 #define LARGEST_MAGNITUDE 1e100 /* see checks.py */
 #define LOG_2PI 1.8378770664093453
 
@@ -110,6 +110,13 @@ static int few_states(Py_ssize_t n)
     case 4: BODY(4); break;                                                                                                   \
     }
 
+/* A line of the cache, or of nothing. */
+#if defined(__GNUC__)
+#define fetch(address) __builtin_prefetch(address)
+#else
+#define fetch(address) (void)(address)
+#endif
+
 /* Series side by side, in the registers of the processor where the compiler has a type for them. */
 #if defined(__GNUC__)
 #pragma GCC diagnostic ignored "-Wpsabi" /* vectors are passed between inlined functions only */
@@ -146,6 +153,9 @@ typedef struct {
     Py_ssize_t n_series, n_times, n_dof, n_paths;
     const double *closed, *feedback, *sensor, *precisions, *observed, *paths;
 } Series;
+
+/* Times of so many degrees of freedom that are brought side by side at once. */
+static Py_ssize_t longest_tile(Py_ssize_t n_dof) { return n_dof < TILE ? TILE / n_dof : 1; }
 
 /* Windows of n executions, each after the linear maps of its own place, one for each account of it. */
 typedef struct {
@@ -195,6 +205,9 @@ typedef struct {
 #define logarithm NAMED(logarithm)
 #define plus NAMED(plus)
 #define bring_together NAMED(bring_together)
+#define transpose NAMED(transpose)
+#define take_apart NAMED(take_apart)
+#define filter_tile NAMED(filter_tile)
 #define innovation_of NAMED(innovation_of)
 #define go_on NAMED(go_on)
 #define score_tile NAMED(score_tile)
@@ -356,7 +369,7 @@ static PyObject *squared_innovations(PyObject *module, PyObject *const *argument
     if (take(arguments, given, specs, COUNT, x) < 0) return NULL;
     int done = series_fit(x, &s, &n) && agree(&x[6], "squares", s.n_series, s.n_dof, 0, 0);
     if (done) {
-        const Py_ssize_t longest = s.n_dof < TILE ? TILE / s.n_dof : 1;
+        const Py_ssize_t longest = longest_tile(s.n_dof);
         double *work = malloc((longest * s.n_dof + s.n_dof * (n + 1)) * WIDTH * sizeof(double));
         done = work != NULL;
         if (done) {
@@ -384,7 +397,8 @@ static PyObject *smoothed_states(PyObject *module, PyObject *const *arguments, P
     done = done && agree(&x[6], "predicted_covariances", s.n_times, s.n_dof, n, n)
            && agree(&x[7], "path_states", s.n_times, s.n_dof, n, 0) && agree(&x[8], "smoothed", s.n_series, s.n_times, s.n_dof, n);
     if (done) {
-        double *work = malloc((s.n_dof + n + 1 + s.n_dof * n) * s.n_times * WIDTH * sizeof(double));
+        const Py_ssize_t longest = longest_tile(s.n_dof);
+        double *work = malloc((longest * (n + 1) + n + s.n_times * (n + 1)) * s.n_dof * WIDTH * sizeof(double));
         done = work != NULL;
         if (done) {
             Py_BEGIN_ALLOW_THREADS
@@ -1010,6 +1024,19 @@ static Py_ssize_t step_all(int n, Py_ssize_t n_dof, Py_ssize_t stride, const dou
 
 /* ---- Series that share their gains -------------------------------------------------------------------------------------- */
 
+#ifdef SHUFFLE
+/* Rows become columns, in place. */
+INLINE void transpose(Vector x[4])
+{
+    const Vector a = SHUFFLE(x[0], x[1], 0, 4, 2, 6), b = SHUFFLE(x[0], x[1], 1, 5, 3, 7);
+    const Vector c = SHUFFLE(x[2], x[3], 0, 4, 2, 6), d = SHUFFLE(x[2], x[3], 1, 5, 3, 7);
+    x[0] = SHUFFLE(a, c, 0, 1, 4, 5);
+    x[1] = SHUFFLE(b, d, 0, 1, 4, 5);
+    x[2] = SHUFFLE(a, c, 2, 3, 6, 7);
+    x[3] = SHUFFLE(b, d, 2, 3, 6, 7);
+}
+#endif
+
 /* Observations less their path, `steps` times of WIDTH series from `first` on, side by side: tile[(t, d)][series]. */
 INLINE void bring_together(const Series *s, Py_ssize_t first, Py_ssize_t start, Py_ssize_t steps, double *tile)
 {
@@ -1023,23 +1050,32 @@ INLINE void bring_together(const Series *s, Py_ssize_t first, Py_ssize_t start, 
     Py_ssize_t i = 0;
 #ifdef SHUFFLE
     for (; i + 4 <= length; i += 4)
-        for (int part = 0; part < PARTS; part++) {
+        for (int w = 0; w < WIDTH; w += 4) {
             Vector x[4];
-            if (i % 8 == 0) /* a cache line of the series that are next: rows are too short for the processor to guess it */
-                for (int w = 0; w < 4; w++) __builtin_prefetch(o[4 * part + w] + i + WIDTH * size);
-            UNROLL for (int w = 0; w < 4; w++)
-                x[w] = *(const Anywhere *)(o[4 * part + w] + i) - *(const Anywhere *)(path[4 * part + w] + i);
-            const Vector a = SHUFFLE(x[0], x[1], 0, 4, 2, 6), b = SHUFFLE(x[0], x[1], 1, 5, 3, 7);
-            const Vector c = SHUFFLE(x[2], x[3], 0, 4, 2, 6), d = SHUFFLE(x[2], x[3], 1, 5, 3, 7);
-            double *to = tile + i * WIDTH + 4 * part;
-            *(Anywhere *)to = SHUFFLE(a, c, 0, 1, 4, 5);
-            *(Anywhere *)(to + WIDTH) = SHUFFLE(b, d, 0, 1, 4, 5);
-            *(Anywhere *)(to + 2 * WIDTH) = SHUFFLE(a, c, 2, 3, 6, 7);
-            *(Anywhere *)(to + 3 * WIDTH) = SHUFFLE(b, d, 2, 3, 6, 7);
+            UNROLL for (int k = 0; k < 4; k++) x[k] = *(const Anywhere *)(o[w + k] + i) - *(const Anywhere *)(path[w + k] + i);
+            transpose(x);
+            UNROLL for (int k = 0; k < 4; k++) *(Anywhere *)(tile + (i + k) * WIDTH + w) = x[k];
         }
 #endif
     for (; i < length; i++)
         for (int w = 0; w < WIDTH; w++) tile[i * WIDTH + w] = o[w][i] - path[w][i];
+}
+
+/* `length` numbers of each of WIDTH series, or of as many as are left, from side by side to rows that are `size` long. */
+INLINE void take_apart(const double *together, Py_ssize_t length, Py_ssize_t size, Py_ssize_t left, double *rows)
+{
+    Py_ssize_t i = 0;
+#ifdef SHUFFLE
+    for (; i + 4 <= length && left >= WIDTH; i += 4)
+        for (int w = 0; w < WIDTH; w += 4) {
+            Vector x[4];
+            UNROLL for (int k = 0; k < 4; k++) x[k] = *(const Anywhere *)(together + (i + k) * WIDTH + w);
+            transpose(x);
+            UNROLL for (int k = 0; k < 4; k++) *(Anywhere *)(rows + (w + k) * size + i) = x[k];
+        }
+#endif
+    for (; i < length; i++)
+        for (int w = 0; w < WIDTH && w < left; w++) rows[w * size + i] = together[i * WIDTH + w];
 }
 
 INLINE Lane innovation_of(int n, const double *c, Lane y, const Lane *d)
@@ -1048,26 +1084,30 @@ INLINE Lane innovation_of(int n, const double *c, Lane y, const Lane *d)
     return y;
 }
 
+/* Each next state waits for n operations after the last ones: compilers fuse the first product here with the sum, so that the
+   other, which does not wait for the state, begins it. */
 INLINE void go_on(int n, const double *closed, const double *feedback, Lane y, Lane *d)
 {
     Lane next[MOST_STATES];
     UNROLL for (int i = 0; i < n; i++) {
-        next[i] = times(feedback[i], y);
-        UNROLL for (int k = 0; k < n; k++) next[i] = plus(next[i], closed[i * n + k], d[k]);
+        next[i] = plus(times(closed[i * n], d[0]), feedback[i], y);
+        UNROLL for (int k = 1; k < n; k++) next[i] = plus(next[i], closed[i * n + k], d[k]);
     }
     UNROLL for (int i = 0; i < n; i++) d[i] = next[i];
 }
 
+/* Goes on with the sums of one degree of freedom of WIDTH series. Meanwhile those of the series that follow, which are as many
+   numbers, one after the other, are fetched from memory: their rows are too short for the processor to guess it. */
 INLINE void score_tile(int n, const Series *s, Py_ssize_t dof, Py_ssize_t start, Py_ssize_t steps, const double *tile,
-                       double *state, double *sums)
+                       const double *following, double *state, double *sums)
 {
     Lane d[MOST_STATES], sum = load(sums);
     UNROLL for (int i = 0; i < n; i++) d[i] = load(state + i * WIDTH);
     for (Py_ssize_t t = 0; t < steps; t++) {
         const Py_ssize_t here = (start + t) * s->n_dof + dof;
         const Lane y = load(tile + (t * s->n_dof + dof) * WIDTH), e = innovation_of(n, s->sensor + dof * n, y, d);
-        const Lane weighted = times(s->precisions[here], e);
-        UNROLL for (int i = 0; i < PARTS; i++) sum.part[i] += weighted.part[i] * e.part[i];
+        sum = plus_product(sum, times(s->precisions[here], e), e);
+        fetch(following + here * WIDTH);
         go_on(n, s->closed + here * n * n, s->feedback + here * n, y, d);
     }
     UNROLL for (int i = 0; i < n; i++) store(state + i * WIDTH, d[i]);
@@ -1077,15 +1117,16 @@ INLINE void score_tile(int n, const Series *s, Py_ssize_t dof, Py_ssize_t start,
 /* Sums of e^2 / S over time, (N, D); NaN where an observation is missing. */
 static void score_all(int n, const Series *s, double *tile, double *state, double *squares)
 {
-    const Py_ssize_t d = s->n_dof, longest = d < TILE ? TILE / d : 1;
+    const Py_ssize_t d = s->n_dof, longest = longest_tile(d);
     double *sums = state + d * n * WIDTH;
     for (Py_ssize_t first = 0; first < s->n_series; first += WIDTH) {
+        const double *following = s->observed + (first + WIDTH) * s->n_times * d;
         memset(state, 0, d * (n + 1) * WIDTH * sizeof(double));
         for (Py_ssize_t start = 0; start < s->n_times; start += longest) {
             const Py_ssize_t steps = s->n_times - start < longest ? s->n_times - start : longest;
             bring_together(s, first, start, steps, tile);
             for (Py_ssize_t dof = 0; dof < d; dof++) {
-#define BODY(k) score_tile(k, s, dof, start, steps, tile, state + dof * n * WIDTH, sums + dof * WIDTH)
+#define BODY(k) score_tile(k, s, dof, start, steps, tile, following, state + dof * n * WIDTH, sums + dof * WIDTH)
                 WITH_STATES(n, BODY)
 #undef BODY
             }
@@ -1095,55 +1136,76 @@ static void score_all(int n, const Series *s, double *tile, double *state, doubl
     }
 }
 
-/* Smoothed states of one degree of freedom of WIDTH series:
-   rho[t] = c e / S + F[t]^T rho[t+1],  smoothed = path + d[t] + P[t] rho[t] */
-INLINE void smooth_tile(int n, const Series *s, const double *predicted, const double *states, Py_ssize_t dof,
-                        const double *tile, double *work, double *together)
+/* Some times of one degree of freedom of WIDTH series: d and e of each are kept. */
+INLINE void filter_tile(int n, const Series *s, Py_ssize_t dof, Py_ssize_t start, Py_ssize_t steps, const double *tile,
+                        const double *following, double *state, double *kept)
 {
-    Lane d[MOST_STATES], rho[MOST_STATES], back[MOST_STATES];
-    const double *c = s->sensor + dof * n;
-    const Py_ssize_t stride = (n + 1) * WIDTH;
-    UNROLL for (int i = 0; i < n; i++) d[i] = rho[i] = times(0.0, load(tile));
-    for (Py_ssize_t t = 0; t < s->n_times; t++) {
-        const Py_ssize_t here = t * s->n_dof + dof;
-        const Lane y = load(tile + here * WIDTH);
-        UNROLL for (int i = 0; i < n; i++) store(work + t * stride + i * WIDTH, d[i]);
-        store(work + t * stride + n * WIDTH, innovation_of(n, c, y, d));
+    Lane d[MOST_STATES];
+    UNROLL for (int i = 0; i < n; i++) d[i] = load(state + i * WIDTH);
+    for (Py_ssize_t t = 0; t < steps; t++) {
+        const Py_ssize_t here = (start + t) * s->n_dof + dof;
+        double *own = kept + here * (n + 1) * WIDTH;
+        const Lane y = load(tile + (t * s->n_dof + dof) * WIDTH);
+        UNROLL for (int i = 0; i < n; i++) store(own + i * WIDTH, d[i]);
+        store(own + n * WIDTH, innovation_of(n, s->sensor + dof * n, y, d));
+        fetch(following + here * WIDTH);
         go_on(n, s->closed + here * n * n, s->feedback + here * n, y, d);
     }
-    for (Py_ssize_t t = s->n_times - 1; t >= 0; t--) {
-        const Py_ssize_t here = t * s->n_dof + dof;
-        const double *before = work + t * stride, *closed = s->closed + here * n * n;
-        const Lane weighted = times(s->precisions[here], load(before + n * WIDTH));
+    UNROLL for (int i = 0; i < n; i++) store(state + i * WIDTH, d[i]);
+}
+
+/* Back through the same times:  rho[t] = c e / S + F[t]^T rho[t+1],  smoothed = path + d[t] + P[t] rho[t] */
+INLINE void smooth_tile(int n, const Series *s, const double *predicted, const double *states, Py_ssize_t dof, Py_ssize_t start,
+                        Py_ssize_t steps, const double *kept, double *state, double *together)
+{
+    Lane rho[MOST_STATES], back[MOST_STATES];
+    const double *c = s->sensor + dof * n;
+    UNROLL for (int i = 0; i < n; i++) rho[i] = load(state + i * WIDTH);
+    for (Py_ssize_t t = steps - 1; t >= 0; t--) {
+        const Py_ssize_t here = (start + t) * s->n_dof + dof;
+        const double *own = kept + here * (n + 1) * WIDTH, *closed = s->closed + here * n * n;
+        const Lane weighted = times(s->precisions[here], load(own + n * WIDTH));
         UNROLL for (int i = 0; i < n; i++) {
-            back[i] = times(c[i], weighted);
-            UNROLL for (int k = 0; k < n; k++) back[i] = plus(back[i], closed[k * n + i], rho[k]);
+            back[i] = plus(times(closed[i], rho[0]), c[i], weighted);
+            UNROLL for (int k = 1; k < n; k++) back[i] = plus(back[i], closed[k * n + i], rho[k]);
         }
         UNROLL for (int i = 0; i < n; i++) rho[i] = back[i];
         UNROLL for (int i = 0; i < n; i++) {
-            Lane value = load(before + i * WIDTH);
+            Lane value = load(own + i * WIDTH);
             UNROLL for (int k = 0; k < n; k++) value = plus(value, predicted[(here * n + i) * n + k], rho[k]);
-            UNROLL for (int k = 0; k < PARTS; k++) value.part[k] += states[here * n + i];
-            store(together + (here * n + i) * WIDTH, value);
+            store(together + ((t * s->n_dof + dof) * n + i) * WIDTH, plus_number(value, states[here * n + i]));
         }
     }
+    UNROLL for (int i = 0; i < n; i++) store(state + i * WIDTH, rho[i]);
 }
 
-static void smooth_all(int n, const Series *s, const double *predicted, const double *states, double *work,
-                              double *smoothed)
+static void smooth_all(int n, const Series *s, const double *predicted, const double *states, double *work, double *smoothed)
 {
-    const Py_ssize_t size = s->n_times * s->n_dof * n;
-    double *tile = work + s->n_times * (n + 1) * WIDTH, *together = tile + s->n_times * s->n_dof * WIDTH;
+    const Py_ssize_t d = s->n_dof, size = s->n_times * d, longest = longest_tile(d);
+    double *tile = work, *together = tile + longest * d * WIDTH, *state = together + longest * d * n * WIDTH;
+    double *kept = state + d * n * WIDTH;
     for (Py_ssize_t first = 0; first < s->n_series; first += WIDTH) {
-        bring_together(s, first, 0, s->n_times, tile);
-        for (Py_ssize_t dof = 0; dof < s->n_dof; dof++) {
-#define BODY(k) smooth_tile(k, s, predicted, states, dof, tile, work, together)
-            WITH_STATES(n, BODY)
+        const double *following = s->observed + (first + WIDTH) * size;
+        Py_ssize_t start = 0, steps = 0;
+        memset(state, 0, d * n * WIDTH * sizeof(double));
+        for (; start < s->n_times; start += steps) {
+            steps = s->n_times - start < longest ? s->n_times - start : longest;
+            bring_together(s, first, start, steps, tile);
+            for (Py_ssize_t dof = 0; dof < d; dof++) {
+#define BODY(k) filter_tile(k, s, dof, start, steps, tile, following, state + dof * n * WIDTH, kept)
+                WITH_STATES(n, BODY)
 #undef BODY
+            }
         }
-        for (int w = 0; w < WIDTH && first + w < s->n_series; w++) {
-            double *own = smoothed + (first + w) * size;
-            for (Py_ssize_t i = 0; i < size; i++) own[i] = together[i * WIDTH + w];
+        memset(state, 0, d * n * WIDTH * sizeof(double));
+        for (; start > 0; steps = longest) {
+            start -= steps;
+            for (Py_ssize_t dof = 0; dof < d; dof++) {
+#define BODY(k) smooth_tile(k, s, predicted, states, dof, start, steps, kept, state + dof * n * WIDTH, together)
+                WITH_STATES(n, BODY)
+#undef BODY
+            }
+            take_apart(together, steps * d * n, size * n, s->n_series - first, smoothed + (first * size + start * d) * n);
         }
     }
 }

@@ -35,6 +35,8 @@ __all__ = [
 LOG_2PI = float(np.log(2 * np.pi))
 BLOCK = 2048
 """Series that are filtered side by side: what is known of them stays in the cache."""
+STEPS = 32
+"""Steps that are taken at once, as one product of matrices: many cost arithmetic, few cost calls."""
 
 
 def filter_systems(
@@ -133,14 +135,20 @@ def squared_innovations(
     paths : what is expected without observations, (N, T, D) array, or (1, T, D) for all alike.
     squares : written, (N, D).
     """
+    n_times, n_dof, n = feedback.shape
+    responses = _responses(closed_loop, feedback, sensor, precisions)
     with np.errstate(over="ignore", invalid="ignore"):  # what cannot be squared is looked at afterwards
-        for block, y in _blocks(observations, paths):
-            total = np.zeros(y.shape[1:])
-            state = np.zeros((sensor.shape[1], *total.shape))
-            for t, now in enumerate(y):
-                innovation = now - np.einsum("dn,ndk->dk", sensor, state)
-                total += innovation**2 * precisions[t, :, None]
-                state = _go_on(closed_loop[t], feedback[t], now, state)
+        for block in _parts(len(observations), max(1, BLOCK // n_dof)):
+            observed = np.moveaxis(observations[block], -1, 0)
+            expected = np.moveaxis(paths if len(paths) == 1 else paths[block], -1, 0)
+            total = np.zeros(observed.shape[:2])
+            before = np.zeros((*total.shape, n + STEPS))  # states, and what is observed from there on
+            for times, response in zip(_parts(n_times, STEPS), responses, strict=True):
+                used = n + times.stop - times.start
+                np.subtract(observed[..., times], expected[..., times], out=before[..., n:used])
+                after = response[:, :used, :used] @ before[..., :used].mT
+                before[..., :n] = after[:, :n].mT
+                total += np.einsum("dtk,dtk->dk", after[:, n:], after[:, n:])
             squares[block] = total.T
 
 
@@ -163,7 +171,8 @@ def smoothed_states(
     path_states : the states expected without observations, (T, D, n) array.
     smoothed : written, (N, T, D, n).
     """
-    for block, y in _blocks(observations, paths):
+    for block in _parts(len(observations), BLOCK):
+        y = np.ascontiguousarray(np.moveaxis(observations[block] - (paths if len(paths) == 1 else paths[block]), 0, -1))
         predicted = np.zeros((len(y) + 1, sensor.shape[1], *y.shape[1:]))
         for t, now in enumerate(y):
             predicted[t + 1] = _go_on(closed_loop[t], feedback[t], now, predicted[t])
@@ -176,14 +185,35 @@ def smoothed_states(
             smoothed[block, t] = path_states[t] + np.moveaxis(corrected, -1, 0).mT
 
 
-def _blocks(observations: FloatArray, paths: FloatArray) -> "list[tuple[slice, FloatArray]]":
-    """Observations less their paths, some series at a time, (T, D, k)."""
-    parts = [slice(first, min(first + BLOCK, len(observations))) for first in range(0, len(observations), BLOCK)]
-    of_all = len(paths) == 1
-    return [
-        (part, np.ascontiguousarray(np.moveaxis(observations[part] - (paths if of_all else paths[part]), 0, -1)))
-        for part in parts
-    ]
+def _responses(closed_loop: FloatArray, feedback: FloatArray, sensor: FloatArray, precisions: FloatArray) -> FloatArray:
+    """What STEPS steps at a time make of states and observations, in this order: the states that follow and e / sqrt(S).
+
+    Returns (T / STEPS, D, n + STEPS, n + STEPS): the recursion, of all such stretches side by side, of one number that is 1.
+    """
+    n_times, n_dof, n = feedback.shape
+    n_stretches = -(-n_times // STEPS)
+
+    def in_stretches(array: FloatArray) -> FloatArray:
+        padded = np.zeros((n_stretches * STEPS, *array.shape[1:]))
+        padded[:n_times] = array
+        return padded.reshape(n_stretches, STEPS, *array.shape[1:])
+
+    closed, gains, roots = in_stretches(closed_loop), in_stretches(feedback), in_stretches(np.sqrt(precisions))
+    responses = np.empty((n_stretches, n_dof, n + STEPS, n + STEPS))
+    state = np.zeros((n_stretches, n_dof, n, n + STEPS))
+    state[..., :n] = np.eye(n)
+    for t in range(STEPS):
+        innovation = -np.matmul(sensor[:, None], state)[..., 0, :]
+        innovation[..., n + t] += 1
+        responses[..., n + t, :] = innovation * roots[:, t, :, None]
+        state = closed[:, t] @ state
+        state[..., n + t] += gains[:, t]
+    responses[..., :n, :] = state
+    return responses
+
+
+def _parts(length: int, size: int) -> list[slice]:
+    return [slice(first, min(first + size, length)) for first in range(0, length, size)]
 
 
 def _go_on(closed_loop: FloatArray, feedback: FloatArray, y: FloatArray, state: FloatArray) -> FloatArray:

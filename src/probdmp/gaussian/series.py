@@ -113,8 +113,9 @@ def score_series(
     paths : (N, T, D) array, what is expected of each without observations; that of the model unless given.
     """
     observed, expected = _checked(gains, observations, paths)
-    squares = np.empty((len(observed), observed.shape[2]))
-    if len(observed) == 0:
+    n_series, _, n_dof = observed.shape
+    squares = np.empty((n_series, n_dof))
+    if n_series == 0:
         return np.zeros(0)
 
     if n_threads == 1:  # a single short series takes less time than to ask for threads
@@ -125,13 +126,13 @@ def score_series(
             own = expected if len(expected) == 1 else expected[part]
             kernels.squared_innovations(*gains.recursion, observed[part], own, squares[part])
 
-        kernels.in_threads(score, len(observed), check_count(n_threads, "n_threads", most=MOST_THREADS))
-    if squares.size <= FEW:  # numbers of which each takes less time than a call
+        kernels.in_threads(score, n_series, check_count(n_threads, "n_threads", most=MOST_THREADS))
+    if n_series * n_dof <= FEW:  # numbers of which each takes less time than a call
         sums = [sum(of_each) for of_each in squares.tolist()]
-        if all(some < LARGEST_MAGNITUDE for some in sums):
+        if sum(sums) < LARGEST_MAGNITUDE:  # no NaN among them, and no infinity
             return np.array([gains.constant - 0.5 * some for some in sums])
     total = np.add.reduce(squares, axis=1)
-    if np.maximum.reduce(total) < LARGEST_MAGNITUDE:  # no NaN among them, and no infinity
+    if np.maximum.reduce(total) < LARGEST_MAGNITUDE:
         return gains.constant - 0.5 * total
     incomplete = np.argwhere(~(squares < LARGEST_MAGNITUDE))
     check_array(observed[incomplete[:, 0]], "observations", ("N", *gains.path.shape), missing=True)
@@ -199,7 +200,7 @@ def smooth_series(gains: SharedGains, observations: FloatArray, n_threads: int =
 def _checked(gains: SharedGains, observations: FloatArray, paths: FloatArray | None) -> tuple[FloatArray, FloatArray]:
     shape, hint = ("N", *gains.path.shape), "Recordings, then times, then degrees of freedom."
     observed = observations
-    if not is_plain(observed) or observed.ndim != 3 or observed.shape[1:] != gains.path.shape:
+    if not is_plain(observed) or observed.shape[1:] != gains.path.shape:
         observed = check_array(observations, "observations", shape, missing=True, hint=hint)
     if paths is None:
         return observed, gains.path[None]
