@@ -189,7 +189,7 @@ def check_noise_stds(stds: ArrayLike, count: int) -> FloatArray:
     return checked
 
 
-def check_generator(random_state: int | np.random.Generator | None) -> np.random.Generator:
+def check_generator(random_state: "int | np.random.Generator | None") -> "np.random.Generator":
     """Random numbers from a seed, or the generator itself."""
     try:
         return np.random.default_rng(random_state)

@@ -439,7 +439,11 @@ def test_what_was_filtered_is_smoothed_alike(case):
     seen = ~np.isnan(innovations)[..., None]
     weighted = np.where(seen, case.sensor / variances[..., None], 0.0)
     informations = weighted[..., None] * case.sensor[:, None, :]
-    told = weighted * np.nan_to_num(innovations)[..., None], informations, np.eye(n) - gains[..., None] * case.sensor[:, None, :]
+    told = (
+        weighted * np.nan_to_num(innovations)[..., None],
+        informations,
+        np.eye(n) - gains[..., None] * case.sensor[:, None, :],
+    )
     arguments = (case.transition, *told, means, covariances)
     ours, plain = ([np.empty((t, m, n)), np.empty((t, m, n, n))] for _ in range(2))
     _compiled().smooth_backwards(*arguments, *ours)
