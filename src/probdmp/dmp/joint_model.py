@@ -21,7 +21,7 @@ from probdmp.dmp.deviations import DeviationSystem, deviation_system, lasting_va
 from probdmp.dmp.goal_handling import conditioned_part
 from probdmp.dmp.path_distribution import parameter_factor, signal_distribution
 from probdmp.dmp.primitive import Primitive
-from probdmp.dmp.responses import GOAL, START_VELOCITY, parameter_responses
+from probdmp.dmp.responses import GOAL, LONGEST_KEPT, START_VELOCITY, parameter_responses
 from probdmp.dmp.task import Task
 from probdmp.dmp.transformation_system import POSITION
 from probdmp.gaussian import Belief, observe, unit_belief
@@ -106,7 +106,7 @@ def joint_model(primitive: Primitive, task: Task, end_rows: FloatArray) -> Joint
     moves = np.where(np.isnan(task.goal), primitive.start - primitive.starts(task), np.nan)
     moves, goals = (np.concatenate([values, untold], axis=-1) for values in (moves, task.goal))
     moved = ~np.isnan(moves) & np.any(np.nan_to_num(moves) != 0)
-    kinds = (np.isnan(task.start), ~np.isnan(velocities), moved, ~np.isnan(goals))
+    kinds: tuple[BoolArray, ...] = (np.isnan(task.start), ~np.isnan(velocities), moved, ~np.isnan(goals))
     if end_rows.shape[:-1] == (1,):  # what is told, and when it ends, is the same for all
         kinds = (kinds[0][:1], *(kind[:1] if np.all(kind == kind[:1]) else kind for kind in kinds[1:]))
     factors, of_velocity, of_move, of_goal, covariance = _lessons_of(primitive, end_rows, kinds)
@@ -162,17 +162,32 @@ def joint_executions(primitive: Primitive, tasks: Task, dts: FloatArray, n_steps
     dts : (N) or (1) array, seconds.
     n_steps : T.
     """
-    durations, configuration = tasks.duration[: len(dts)], primitive.configuration
-    steps = dts / durations
-    lasts = np.round(1 / steps).astype(np.intp)
+    compute = _kept_setting if len(dts) == 1 and n_steps <= LONGEST_KEPT else _setting
+    rows, end_rows, system = compute(primitive, tuple(tasks.duration[: len(dts)].tolist()), tuple(dts.tolist()), n_steps)
+    return JointExecutions(joint_model(primitive, tasks, end_rows), rows, system)
+
+
+def _setting(
+    primitive: Primitive, lengths: tuple[float, ...], steps: tuple[float, ...], n_steps: int
+) -> tuple[FloatArray, FloatArray, DeviationSystem]:
+    """Rows (T, N, 3, N + 3) of executions, those of their ends (N, N + 3), and how they deviate."""
+    durations, dts, configuration = np.array(lengths), np.array(steps), primitive.configuration
+    phase_steps = dts / durations
+    lasts = np.round(1 / phase_steps).astype(np.intp)
     length = max(n_steps, int(lasts.max()) + 1)
-    responses = np.stack([parameter_responses(configuration, float(step), length) for step in steps], axis=1)
+    responses = np.stack([parameter_responses(configuration, float(step), length) for step in phase_steps], axis=1)
     rows = state_rows(responses, durations)
-    end_rows = rows[lasts, np.arange(len(steps)), POSITION]
+    end_rows = rows[lasts, np.arange(len(phase_steps)), POSITION]
     system = deviation_system(primitive, durations, dts)
     if n_steps < len(rows):  # a view would keep all of them
         rows = rows[:n_steps].copy()
-    return JointExecutions(joint_model(primitive, tasks, end_rows), rows, system)
+    for array in (rows, end_rows):
+        array.setflags(write=False)
+    return rows, end_rows, system
+
+
+_kept_setting = lru_cache(maxsize=16)(_setting)
+"""Executions often differ in nothing but what they are told."""
 
 
 def mean_positions(executions: JointExecutions) -> FloatArray:
