@@ -1,6 +1,7 @@
 """The house: import direction, sizes, documentation."""
 
 import ast
+import importlib
 from pathlib import Path
 from statistics import median
 
@@ -10,7 +11,19 @@ import probdmp
 
 ROOT = Path(probdmp.__file__).parent
 LAYERS = (
-    *("errors", "checks", "parameters", "gaussian", "demonstrations", "dmp", "io", "learning", "execution", "detection"),
+    *(
+        "loading",
+        "errors",
+        "checks",
+        "parameters",
+        "gaussian",
+        "demonstrations",
+        "dmp",
+        "io",
+        "learning",
+        "execution",
+        "detection",
+    ),
     *("evaluation", "estimator", "plotting", "fleet", "studio", "cli"),
 )
 """From the bottom up: a module imports only from names before its own."""
@@ -51,6 +64,13 @@ def test_imports_point_downward(path: Path) -> None:
 
 def test_only_the_command_line_and_the_studio_import_the_estimator() -> None:
     assert {layer_of(p) for p in MODULES if "estimator" in probdmp_imports(p)} <= {"__init__", "estimator", "studio", "cli"}
+
+
+@pytest.mark.parametrize("package", ["demonstrations", "estimator", "learning"])
+def test_names_that_are_loaded_when_used_are_all_there_and_not_those_of_modules(package: str) -> None:
+    module = importlib.import_module(f"probdmp.{package}")
+    assert all(getattr(module, name) is not None for name in module.__all__)
+    assert not set(module.__all__) & {path.stem for path in (ROOT / package).glob("*.py")}
 
 
 def test_modules_are_small() -> None:

@@ -3,6 +3,8 @@
 import subprocess
 import sys
 
+import pytest
+
 import probdmp
 
 PUBLIC = [
@@ -70,6 +72,41 @@ def test_the_core_needs_numpy_alone_until_it_is_used() -> None:
 def test_importing_alone_loads_nothing() -> None:
     assert "numpy" not in loaded_after("import probdmp")
     assert "probdmp.dmp" not in loaded_after("import probdmp.gaussian")
+
+
+def test_the_class_alone_loads_what_a_fit_needs() -> None:
+    script = "from probdmp import ProbabilisticDMP; import sys; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split()
+    heavy = {"numpy.random", "numpy.ma", "hashlib", "pathlib"}
+    heavy |= {f"probdmp.{name}" for name in ("detection", "io", "execution", "evaluation", "demonstrations.letters")}
+    assert not heavy & (set(loaded) - set(loaded_by_numpy()))
+
+
+def loaded_by_numpy() -> list[str]:
+    script = "import numpy, sys; print(*sys.modules)"
+    return subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split()
+
+
+STEPS = """
+import sys
+import numpy as np
+from probdmp import FailureDetector, ProbabilisticDMP
+rng = np.random.default_rng(0)
+paths = [np.cumsum(rng.normal(1.0, 0.1, (60, 2)), axis=0) for _ in range(6)]
+dmp = ProbabilisticDMP(n_basis=8, weight_uncertainty={weights!r}).fit(paths, dt=0.01)
+execution = dmp.execute(detector=FailureDetector().fit(dmp, paths, dt=0.01))
+before = set(sys.modules)
+for observation in paths[0]:
+    execution.step(observation)
+print(*(set(sys.modules) - before))
+"""
+
+
+@pytest.mark.parametrize("weights", ["joint", "independent"])
+def test_a_control_loop_loads_nothing(weights: str) -> None:
+    script = STEPS.format(weights=weights)
+    ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert not ran.stdout.split()
 
 
 def test_the_web_server_is_loaded_by_the_studio_alone_and_only_when_it_serves() -> None:

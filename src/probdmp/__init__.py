@@ -5,8 +5,9 @@ Source: F. Meier, S. Schaal, A Probabilistic Representation for Dynamic Movement
 Names are loaded when first used, so that `import probdmp` and the command line's help cost next to nothing.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from probdmp.loading import loaded_when_used
 
 if TYPE_CHECKING:
     from probdmp.demonstrations import Demonstration, demonstration_from_times, synthetic_arm_movements, synthetic_letters
@@ -42,26 +43,15 @@ __all__ = [
 
 __version__ = "0.1.0"
 
-_HOMES = {
-    "demonstrations": ("Demonstration", "demonstration_from_times", "synthetic_arm_movements", "synthetic_letters"),
-    "detection": ("FailureDetector", "Verdict"),
-    "dmp": ("Primitive", "Task"),
-    "errors": ("InputError", "ModelFileError", "ProbDMPError"),
-    "estimator": ("PrimitiveLibrary", "ProbabilisticDMP", "load", "load_detector"),
-    "execution": ("GaussianTrajectory", "OnlineExecution", "TrackedTrajectory"),
-    "io": ("read_demonstrations", "write_demonstrations"),
-}
-"""Which sub-package each public name comes from."""
-
-
-def __getattr__(name: str) -> Any:
-    for home, names in _HOMES.items():
-        if name in names:
-            value = getattr(import_module(f"probdmp.{home}"), name)
-            globals()[name] = value
-            return value
-    raise AttributeError(f"module 'probdmp' has no attribute {name!r}")
-
-
-def __dir__() -> list[str]:
-    return sorted([*globals(), *__all__])
+__getattr__, __dir__ = loaded_when_used(
+    __name__,
+    {
+        "demonstrations": ("Demonstration", "demonstration_from_times", "synthetic_arm_movements", "synthetic_letters"),
+        "detection": ("FailureDetector", "Verdict"),
+        "dmp": ("Primitive", "Task"),
+        "errors": ("InputError", "ModelFileError", "ProbDMPError"),
+        "estimator": ("PrimitiveLibrary", "ProbabilisticDMP", "load", "load_detector"),
+        "execution": ("GaussianTrajectory", "OnlineExecution", "TrackedTrajectory"),
+        "io": ("read_demonstrations", "write_demonstrations"),
+    },
+)

@@ -91,6 +91,8 @@ def check_array(
     actual: tuple[int, ...] = array.shape
     if len(actual) != len(shape) or any(isinstance(n, int) and n != m for n, m in zip(shape, actual, strict=True)):
         raise InputError(f"{name} of shape {wanted}", shape_text(actual), hint)
+    if np.abs(array).max(initial=0.0) <= LARGEST_MAGNITUDE:  # NaN is not
+        return array
     bad = ~np.isfinite(array)
     if missing:
         bad &= ~np.isnan(array)
@@ -189,7 +191,7 @@ def check_noise_stds(stds: ArrayLike, count: int) -> FloatArray:
     return checked
 
 
-def check_generator(random_state: int | np.random.Generator | None) -> np.random.Generator:
+def check_generator(random_state: "int | np.random.Generator | None") -> "np.random.Generator":
     """Random numbers from a seed, or the generator itself."""
     try:
         return np.random.default_rng(random_state)

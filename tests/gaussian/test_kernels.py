@@ -577,3 +577,35 @@ def _is_built():
     except ImportError:
         return False
     return True
+
+
+@needs_extension
+@given(cases())
+def test_what_was_filtered_is_smoothed_alike(case):
+    t, (m, n) = len(case.observations), case.sensor.shape
+    means, covariances, innovations, variances, _, gains = filtered(_kernels_numpy, case)
+    seen = ~np.isnan(innovations)[..., None]
+    weighted = np.where(seen, case.sensor / variances[..., None], 0.0)
+    informations = weighted[..., None] * case.sensor[:, None, :]
+    told = (
+        weighted * np.nan_to_num(innovations)[..., None],
+        informations,
+        np.eye(n) - gains[..., None] * case.sensor[:, None, :],
+    )
+    arguments = (case.transition, *told, means, covariances)
+    ours, plain = ([np.empty((t, m, n)), np.empty((t, m, n, n))] for _ in range(2))
+    _compiled().smooth_backwards(*arguments, *ours)
+    _kernels_numpy.smooth_backwards(*arguments, *plain)
+    size = 1 + max(float(np.max(np.abs(case.initial_mean), initial=0.0)), float(np.max(np.abs(covariances), initial=0.0)))
+    for first, second in zip(ours, plain, strict=True):
+        assert_same(first, second, 1e-12 * max(1.0, size / float(case.noise.min())))
+
+
+@needs_extension
+def test_filtered_states_that_do_not_belong_together_are_refused():
+    vectors, matrices = np.zeros((5, 2, 3)), np.zeros((5, 2, 3, 3))
+    arguments = [np.zeros((2, 3, 3)), vectors, matrices, matrices, vectors, matrices, vectors.copy(), matrices.copy()]
+    _compiled().smooth_backwards(*arguments)
+    for i in range(1, len(arguments)):
+        with pytest.raises(ValueError, match="expected"):
+            _compiled().smooth_backwards(*arguments[:i], arguments[i][:-1], *arguments[i + 1 :])

@@ -1,6 +1,5 @@
 """A recorded movement as checked data."""
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -100,6 +99,8 @@ class Demonstration:
     @property
     def fingerprint(self) -> str:
         """SHA-256 of positions and dt, by which a recording is known again."""
+        import hashlib  # loads OpenSSL
+
         return hashlib.sha256(np.float64(self.dt).tobytes() + self.positions.tobytes()).hexdigest()
 
     @property

@@ -38,6 +38,15 @@ class DeviationSystem(NamedTuple):
         b = self.input_vector
         return np.asarray(self.variances[..., None, None] * b[..., :, None] * b[..., None, :])
 
+    def driven(self, n_steps: int) -> FloatArray:
+        """Covariances of a deviation that unit noise drives, (T, *batch, 3, 3) array: sums of A^j B B^T A^jT."""
+        transition, moved = self.transition[..., 0, :, :], self.input_vector[..., 0, :]
+        covariances = np.zeros((n_steps, *transition.shape))
+        for t in range(1, n_steps):
+            covariances[t] = moved[..., :, None] * moved[..., None, :]
+            moved = np.matmul(transition, moved[..., None])[..., 0]
+        return np.cumsum(covariances, axis=0)
+
     def grouped(self, are_coupled: bool) -> tuple[FloatArray, FloatArray]:
         """A and Q of the groups of states that are filtered together, (*batch, G, n, n): of each signal, or of all at once."""
         if not are_coupled:

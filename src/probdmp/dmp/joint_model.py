@@ -10,20 +10,21 @@ What is told of an execution, its goal or its start velocity, is told of rows[t]
 `probdmp.gaussian.augmented`; F has no more columns than x has independent directions.
 """
 
+import math
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
-from probdmp.checks import FloatArray, frozen
+from probdmp.checks import BoolArray, FloatArray, frozen
 from probdmp.dmp.deviations import DeviationSystem, deviation_system, lasting_variances
 from probdmp.dmp.goal_handling import conditioned_part
 from probdmp.dmp.path_distribution import parameter_factor, signal_distribution
 from probdmp.dmp.primitive import Primitive
-from probdmp.dmp.responses import GOAL, START_VELOCITY, parameter_responses
+from probdmp.dmp.responses import GOAL, LONGEST_KEPT, START_VELOCITY, parameter_responses
 from probdmp.dmp.task import Task
 from probdmp.dmp.transformation_system import POSITION
-from probdmp.gaussian import Belief, linear_moments, observe, unit_belief
+from probdmp.gaussian import Belief, observe, unit_belief
 
 __all__ = [
     "JointExecutions",
@@ -51,10 +52,31 @@ class JointModel(NamedTuple):
     belief: Belief
     """Of z, (*batch, r)."""
 
-    def observed(self, rows: FloatArray, values: FloatArray, variances: FloatArray) -> "JointModel":
-        """Given values (*batch, S) of rows (*batch, N + 3) of each signal; NaN where nothing was seen."""
-        design = _design(self.factors, rows[..., None, :])[..., 0, :]
-        return self._replace(belief=observe(self.belief, values - _along(self.means, rows), design, np.diag(variances)).belief)
+
+class _Lesson(NamedTuple):
+    """What is told of a row of x teaches as much of z, whatever is told."""
+
+    row: FloatArray
+    """(*batch, N + 3) array."""
+    design: FloatArray
+    """The row as a function of z, (*batch, S, r) array."""
+    covariance: FloatArray
+    """Of what was expected, with a unit in place of what is not told; (*batch, S, S) array."""
+    gain: FloatArray
+    """(*batch, r, S) array."""
+
+
+class _Lessons(NamedTuple):
+    """All that executions which are told the same kinds of things have in common."""
+
+    factors: FloatArray
+    """F, (*batch, S, N + 3, r) array."""
+    velocity: _Lesson | None
+    moved: _Lesson | None
+    """Of a goal that stays where it was learned, while the start does not: it leaves z as uncertain as it was."""
+    goal: _Lesson | None
+    covariance: FloatArray
+    """Of z, in the end."""
 
 
 class JointExecutions(NamedTuple):
@@ -77,30 +99,28 @@ def joint_model(primitive: Primitive, task: Task, end_rows: FloatArray) -> Joint
     end_rows : (*batch, N + 3) or (N + 3) array: the position at the end as a function of x, see `state_rows`.
     """
     batch, handling = task.start.shape[:-1], primitive.configuration.goal_handling
-    mean, factor = _start_and_parameters(primitive)
-    unknown = np.isnan(task.start)
+    untold = np.full((*batch, len(primitive.channel_names)), np.nan)  # nobody tells a channel where it has to be
+    velocity = np.full(task.start.shape, np.nan) if task.start_velocity is None else task.start_velocity
+    velocities = np.concatenate([velocity * task.duration[..., None], untold], axis=-1)
+    # A goal that was not told stays where it was learned: from another start, the movement to it is another.
+    moves = np.where(np.isnan(task.goal), primitive.start - primitive.starts(task), np.nan)
+    moves, goals = (np.concatenate([values, untold], axis=-1) for values in (moves, task.goal))
+    moved = ~np.isnan(moves) & np.any(np.nan_to_num(moves) != 0)
+    kinds: tuple[BoolArray, ...] = (np.isnan(task.start), ~np.isnan(velocities), moved, ~np.isnan(goals))
     if end_rows.shape[:-1] == (1,):  # what is told, and when it ends, is the same for all
-        unknown = unknown[:1]
-    factors = np.array(np.broadcast_to(factor, (*unknown.shape[:-1], *factor.shape)))
-    factors[..., : primitive.n_dof, START, :] *= unknown[..., None]
+        kinds = (kinds[0][:1], *(kind[:1] if np.all(kind == kind[:1]) else kind for kind in kinds[1:]))
+    factors, of_velocity, of_move, of_goal, covariance = _lessons_of(primitive, end_rows, kinds)
+    mean = _start_and_parameters(primitive)[0]
     means = np.array(np.broadcast_to(mean, (*batch, *mean.shape)))
     means[..., : primitive.n_dof, START] = primitive.starts(task)
-    model = JointModel(means, factors, unit_belief(unknown.shape[:-1], factor.shape[-1]))
-    signals, n_untold = primitive.signals, len(primitive.channel_names)
-
-    def of_signals(told: FloatArray) -> FloatArray:  # nobody tells a channel where it has to be
-        return np.concatenate([told, np.full((*told.shape[:-1], n_untold), np.nan)], axis=-1)
-
-    if task.start_velocity is not None:
-        told = of_signals(task.start_velocity * task.duration[..., None])
-        row = np.eye(mean.shape[-1])[START_VELOCITY + 1]
-        model = _told(model, row, told, (TOLD_TOLERANCE * signals.ranges) ** 2, START_VELOCITY + 1, handling)
-    left_over = signals.observation_variances + lasting_variances(primitive)
-    tolerances = left_over if signals.residual_variances is None else signals.residual_variances
-    # A goal that was not told stays where it was learned: from another start, the movement to it is another.
-    moved = np.where(np.isnan(task.goal), primitive.start - primitive.starts(task), np.nan)
-    model = _moved(model, end_rows, of_signals(moved), tolerances, GOAL + 1, handling)
-    return _told(model, end_rows, of_signals(task.goal), tolerances, GOAL + 1, handling)
+    model = JointModel(means, factors, Belief(np.zeros((*covariance.shape[:-2], factors.shape[-1])), covariance))
+    if of_velocity is not None:
+        model = _told(model, of_velocity, velocities - _expected(model, of_velocity), START_VELOCITY + 1, handling)
+    if of_move is not None:
+        model = _told(model, of_move, moves, GOAL + 1, handling)
+    if of_goal is not None:
+        model = _told(model, of_goal, goals - _expected(model, of_goal), GOAL + 1, handling)
+    return model
 
 
 def state_rows(responses: FloatArray, duration: FloatArray) -> FloatArray:
@@ -142,17 +162,32 @@ def joint_executions(primitive: Primitive, tasks: Task, dts: FloatArray, n_steps
     dts : (N) or (1) array, seconds.
     n_steps : T.
     """
-    durations, configuration = tasks.duration[: len(dts)], primitive.configuration
-    steps = dts / durations
-    lasts = np.round(1 / steps).astype(np.intp)
+    compute = _kept_setting if len(dts) == 1 and n_steps <= LONGEST_KEPT else _setting
+    rows, end_rows, system = compute(primitive, tuple(tasks.duration[: len(dts)].tolist()), tuple(dts.tolist()), n_steps)
+    return JointExecutions(joint_model(primitive, tasks, end_rows), rows, system)
+
+
+def _setting(
+    primitive: Primitive, lengths: tuple[float, ...], steps: tuple[float, ...], n_steps: int
+) -> tuple[FloatArray, FloatArray, DeviationSystem]:
+    """Rows (T, N, 3, N + 3) of executions, those of their ends (N, N + 3), and how they deviate."""
+    durations, dts, configuration = np.array(lengths), np.array(steps), primitive.configuration
+    phase_steps = dts / durations
+    lasts = np.round(1 / phase_steps).astype(np.intp)
     length = max(n_steps, int(lasts.max()) + 1)
-    responses = np.stack([parameter_responses(configuration, float(step), length) for step in steps], axis=1)
+    responses = np.stack([parameter_responses(configuration, float(step), length) for step in phase_steps], axis=1)
     rows = state_rows(responses, durations)
-    end_rows = rows[lasts, np.arange(len(steps)), POSITION]
+    end_rows = rows[lasts, np.arange(len(phase_steps)), POSITION]
     system = deviation_system(primitive, durations, dts)
     if n_steps < len(rows):  # a view would keep all of them
         rows = rows[:n_steps].copy()
-    return JointExecutions(joint_model(primitive, tasks, end_rows), rows, system)
+    for array in (rows, end_rows):
+        array.setflags(write=False)
+    return rows, end_rows, system
+
+
+_kept_setting = lru_cache(maxsize=16)(_setting)
+"""Executions often differ in nothing but what they are told."""
 
 
 def mean_positions(executions: JointExecutions) -> FloatArray:
@@ -175,37 +210,69 @@ def _start_and_parameters(primitive: Primitive) -> tuple[FloatArray, FloatArray]
     return frozen(mean), frozen(parameter_factor(parameters).reshape(len(mean), n, -1))
 
 
-def _told(
-    model: JointModel, row: FloatArray, values: FloatArray, tolerances: FloatArray, column: int, handling: str
-) -> JointModel:
-    """Given values (*batch, S) of one row of x, as far as the model has them; the rest moves a column of x."""
-    expected, covariance = _expected(model, row, values, tolerances)
-    delta = np.where(np.isnan(values), 0.0, values - expected)
-    inside = conditioned_part(delta, covariance, handling)
-    told = model.observed(row, np.where(np.isnan(values), np.nan, expected + inside), tolerances)
-    means = told.means.copy()
-    means[..., column] += delta - inside
-    return told._replace(means=means)
+def _lessons_of(primitive: Primitive, end_rows: FloatArray, kinds: tuple[BoolArray, ...]) -> _Lessons:
+    """What is told teaches; kept where it is told of one execution, or of all alike.
+
+    Parameters
+    ----------
+    kinds : whether the start is unknown, (*batch, D), and whether the start velocity is told, the goal has to be moved with the
+        start, and the goal is told, (*batch, S) arrays.
+    """
+    if any(math.prod(kind.shape[:-1]) != 1 for kind in (end_rows, *kinds)):
+        return _lessons(primitive, end_rows, *kinds)
+    return _kept_lessons(primitive, end_rows.shape, end_rows.tobytes(), *(kind.tobytes() for kind in kinds))
 
 
-def _moved(
-    model: JointModel, row: FloatArray, deltas: FloatArray, tolerances: FloatArray, column: int, handling: str
-) -> JointModel:
-    """The mean as if the row were told to be `deltas` from where it is, (*batch, S); as uncertain as before."""
-    if not np.any(deltas > 0) and not np.any(deltas < 0):
-        return model
-    expected, _ = _expected(model, row, deltas, tolerances)
-    told = _told(model, row, expected + deltas, tolerances, column, handling)
-    return told._replace(belief=Belief(told.belief.mean, model.belief.covariance))
+def _lessons(
+    primitive: Primitive, end_rows: FloatArray, unknown: BoolArray, velocity: BoolArray, moved: BoolArray, goal: BoolArray
+) -> _Lessons:
+    learned, signals = _start_and_parameters(primitive)[1], primitive.signals
+    factors = np.array(np.broadcast_to(learned, (*unknown.shape[:-1], *learned.shape)))
+    factors[..., : primitive.n_dof, START, :] *= unknown[..., None]
+    left_over = signals.observation_variances + lasting_variances(primitive)
+    tolerances = left_over if signals.residual_variances is None else signals.residual_variances
+    covariance = unit_belief(unknown.shape[:-1], learned.shape[-1]).covariance
+
+    def lesson(row: FloatArray, told: BoolArray, tolerances: FloatArray) -> tuple[_Lesson | None, FloatArray]:
+        if not told.any():
+            return None, covariance
+        design = _design(factors, row[..., None, :])[..., 0, :]
+        before = Belief(np.zeros(covariance.shape[:-1]), covariance)
+        seen = observe(before, np.where(told, 0.0, np.nan), design, np.diag(tolerances))
+        both = told[..., :, None] & told[..., None, :]
+        expected = np.where(both, seen.innovation_covariance, np.eye(len(tolerances)))
+        return _Lesson(row, design, expected, seen.gain @ seen.whitening), seen.belief.covariance
+
+    row = np.eye(learned.shape[-2])[START_VELOCITY + 1]
+    of_velocity, covariance = lesson(row, velocity, (TOLD_TOLERANCE * signals.ranges) ** 2)
+    of_move, _ = lesson(end_rows, moved, tolerances)
+    of_goal, covariance = lesson(end_rows, goal, tolerances)
+    return _Lessons(factors, of_velocity, of_move, of_goal, covariance)
 
 
-def _expected(model: JointModel, row: FloatArray, values: FloatArray, tolerances: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Mean (*batch, S) of one row of x, and its covariance, with a unit in place of what has no value."""
-    mean, covariance = linear_moments(model.belief, _design(model.factors, row[..., None, :])[..., 0, :])
-    seen = ~np.isnan(values)
-    full = covariance + tolerances[..., None] * np.eye(len(tolerances))
-    both = seen[..., :, None] & seen[..., None, :]
-    return _along(model.means, row) + mean, np.where(both, full, np.eye(len(tolerances)))
+@lru_cache(maxsize=8)
+def _kept_lessons(primitive: Primitive, shape: tuple[int, ...], end_rows: bytes, *kinds: bytes) -> _Lessons:
+    """The same from bytes, by which they are found again: executions often differ in nothing but their values."""
+    masks = (np.frombuffer(kind, dtype=np.bool_).reshape(*shape[:-1], -1) for kind in kinds)
+    return _lessons(primitive, np.frombuffer(end_rows).reshape(shape), *masks)
+
+
+def _told(model: JointModel, lesson: _Lesson, deltas: FloatArray, column: int, handling: str) -> JointModel:
+    """The mean if a row is told to be `deltas` (*batch, S) from where it is expected, NaN where it is not told.
+
+    As far as the model has them it is conditioned on them; the rest moves a column of x.
+    """
+    deltas = np.nan_to_num(deltas)
+    inside = conditioned_part(deltas, lesson.covariance, handling)
+    mean = model.belief.mean + np.matmul(lesson.gain, inside[..., None])[..., 0]
+    means = model.means.copy()
+    means[..., column] += deltas - inside
+    return JointModel(means, model.factors, Belief(mean, model.belief.covariance))
+
+
+def _expected(model: JointModel, lesson: _Lesson) -> FloatArray:
+    """Mean of the row of a lesson, (*batch, S)."""
+    return _along(model.means, lesson.row) + np.matmul(lesson.design, model.belief.mean[..., None])[..., 0]
 
 
 def _along(means: FloatArray, row: FloatArray) -> FloatArray:

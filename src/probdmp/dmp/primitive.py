@@ -1,6 +1,5 @@
 """The learned movement primitive: the paper's theta = {mu_w, Sigma_w, alpha, beta, R} and what it needs to run."""
 
-import hashlib
 from dataclasses import dataclass, fields, replace
 from weakref import WeakKeyDictionary
 
@@ -186,6 +185,8 @@ _IDENTITIES: WeakKeyDictionary[Primitive, str] = WeakKeyDictionary()
 
 
 def _identity_of(primitive: Primitive) -> str:
+    import hashlib  # loads OpenSSL
+
     digest = hashlib.sha256()
     for field in fields(primitive):
         value = getattr(primitive, field.name)

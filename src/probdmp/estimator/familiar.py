@@ -8,8 +8,10 @@ from numpy.typing import ArrayLike
 from probdmp.checks import FloatArray
 from probdmp.demonstrations import Recordings, demonstration_from_times
 from probdmp.estimator.learned import HasPrimitive
-from probdmp.execution import GaussianTrajectory
-from probdmp.learning import ForcingWeights, primitive_from_weights
+
+if TYPE_CHECKING:
+    from probdmp.execution import GaussianTrajectory
+    from probdmp.learning import ForcingWeights
 
 __all__ = ["HasFamiliarVerbs"]
 
@@ -20,7 +22,7 @@ class HasFamiliarVerbs(HasPrimitive):
     if TYPE_CHECKING:
 
         def fit(self, demonstrations: Recordings, dt: float | None = None) -> Self: ...
-        def rollout(self, *args: Any, **task: Any) -> GaussianTrajectory: ...
+        def rollout(self, *args: Any, **task: Any) -> "GaussianTrajectory": ...
 
     def imitate(self, times: ArrayLike, positions: ArrayLike) -> Self:
         """`fit` to a single demonstration: (T,) times in seconds, even or not, and (T, D) positions."""
@@ -32,7 +34,7 @@ class HasFamiliarVerbs(HasPrimitive):
         return planned.times, planned.positions
 
     @classmethod
-    def of_weights(cls, forcing: ForcingWeights, **movement: Any) -> Self:
+    def of_weights(cls, forcing: "ForcingWeights", **movement: Any) -> Self:
         """The movement of weights that another library has learned, without any spread.
 
         Parameters
@@ -40,6 +42,8 @@ class HasFamiliarVerbs(HasPrimitive):
         movement : the other arguments of `probdmp.learning.primitive_from_weights`: start, goal, duration, dt, perhaps alpha_z
             and n_basis.
         """
+        from probdmp.learning import primitive_from_weights
+
         primitive = primitive_from_weights(forcing, **movement)
         estimator = cls(**asdict(primitive.configuration) | {"weight_model": "pooled"})
         estimator.primitive_, estimator.fit_report_ = primitive, None

@@ -1,7 +1,7 @@
 """What every method of an estimator starts from: its learned primitive, and what observes it."""
 
 from collections.abc import Mapping, Sequence
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from numpy.typing import ArrayLike
 
@@ -9,9 +9,11 @@ from probdmp.checks import check_seconds
 from probdmp.demonstrations import Demonstration, Recording, as_demonstrations
 from probdmp.dmp import Primitive
 from probdmp.errors import NotFittedError
-from probdmp.execution import Sensor, SensorArray, recording_of_readings
 from probdmp.learning import FitReport
 from probdmp.parameters import HasParameters
+
+if TYPE_CHECKING:
+    from probdmp.execution import Sensor, SensorArray
 
 __all__ = ["HasPrimitive"]
 
@@ -37,12 +39,16 @@ class HasPrimitive(HasParameters):
     def _step(self, dt: float | None) -> float:
         return self._learned().dt if dt is None else check_seconds(dt, "dt")
 
-    def _array(self, sensors: Sequence[Sensor] | None) -> SensorArray:
+    def _array(self, sensors: "Sequence[Sensor] | None") -> "SensorArray":
+        from probdmp.execution import SensorArray
+
         return SensorArray(self._learned(), sensors)
 
     def _recording(
-        self, observations: Recording | Mapping[str, ArrayLike], dt: float | None, array: SensorArray
+        self, observations: Recording | Mapping[str, ArrayLike], dt: float | None, array: "SensorArray"
     ) -> Demonstration:
         if isinstance(observations, Mapping):
+            from probdmp.execution import recording_of_readings
+
             return recording_of_readings(array, observations, self._step(dt))
         return as_demonstrations([observations], self._step(dt))[0]

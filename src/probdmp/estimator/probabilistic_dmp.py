@@ -2,39 +2,23 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields, replace
-from pathlib import Path
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from probdmp.checks import FloatArray, check_count, check_generator, check_noise_stds
 from probdmp.demonstrations import Demonstration, Recording, Recordings, as_demonstrations
-from probdmp.detection import FailureDetector
 from probdmp.dmp import PUBLISHED, Configuration, Task, ViaPoint, condition_primitive, task_for
 from probdmp.errors import InputTypeError
 from probdmp.estimator.familiar import HasFamiliarVerbs
-from probdmp.estimator.saving import write_learned
-from probdmp.execution import (
-    GaussianTrajectory,
-    OnlineExecution,
-    Sensor,
-    SensorNoise,
-    TrackedTrajectory,
-    estimate_sensor_noise,
-    feedback_gains,
-    is_batch,
-    own_batch,
-    roll_out,
-    sample_recordings,
-    sample_trajectories,
-    score_batch,
-    score_recordings,
-    smooth_recording,
-    task_of_recording,
-    track_recording,
-)
 from probdmp.learning import LearningOptions, fit_primitive
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from probdmp.detection import FailureDetector
+    from probdmp.execution import GaussianTrajectory, OnlineExecution, Sensor, SensorNoise, TrackedTrajectory
 
 __all__ = ["ProbabilisticDMP"]
 
@@ -145,8 +129,10 @@ class ProbabilisticDMP(HasFamiliarVerbs):
         duration: float | None = None,
         dt: float | None = None,
         start_velocity: ArrayLike | None = None,
-    ) -> GaussianTrajectory:
+    ) -> "GaussianTrajectory":
         """The movement as planned, with its uncertainty. Source: Algorithm 1."""
+        from probdmp.execution import roll_out
+
         task = task_for(self._learned(), start, goal, duration, start_velocity)
         return roll_out(self._learned(), task, self._step(dt))
 
@@ -158,8 +144,8 @@ class ProbabilisticDMP(HasFamiliarVerbs):
         goal: ArrayLike | None = None,
         duration: float | None = None,
         start_velocity: ArrayLike | None = None,
-        sensors: Sequence[Sensor] | None = None,
-    ) -> TrackedTrajectory:
+        sensors: "Sequence[Sensor] | None" = None,
+    ) -> "TrackedTrajectory":
         """Kalman filter over a recorded execution. Source: Algorithm 2.
 
         Parameters
@@ -167,6 +153,8 @@ class ProbabilisticDMP(HasFamiliarVerbs):
         observations : a Demonstration, with the columns and channels that the outputs of the sensors are named after; a (T, D)
             array of positions; or (T, O) arrays by name of their sensors. NaN where nothing was measured.
         """
+        from probdmp.execution import task_of_recording, track_recording
+
         array = self._array(sensors)
         recording = self._recording(observations, dt, array)
         task = task_of_recording(self._learned(), recording, start, goal, duration, start_velocity)
@@ -180,9 +168,11 @@ class ProbabilisticDMP(HasFamiliarVerbs):
         goal: ArrayLike | None = None,
         duration: float | None = None,
         start_velocity: ArrayLike | None = None,
-        sensors: Sequence[Sensor] | None = None,
-    ) -> GaussianTrajectory:
+        sensors: "Sequence[Sensor] | None" = None,
+    ) -> "GaussianTrajectory":
         """The state at each time given the whole recorded execution, before and after; arguments as for `track`."""
+        from probdmp.execution import smooth_recording, task_of_recording
+
         array = self._array(sensors)
         recording = self._recording(observations, dt, array)
         task = task_of_recording(self._learned(), recording, start, goal, duration, start_velocity)
@@ -194,12 +184,12 @@ class ProbabilisticDMP(HasFamiliarVerbs):
         goal: ArrayLike | None = None,
         duration: float | None = None,
         dt: float | None = None,
-        detector: FailureDetector | None = None,
+        detector: "FailureDetector | None" = None,
         start_velocity: ArrayLike | None = None,
         on_alarm: str = "continue",
-        sensors: Sequence[Sensor] | None = None,
+        sensors: "Sequence[Sensor] | None" = None,
         feedback: Sequence[str] | None = None,
-    ) -> OnlineExecution:
+    ) -> "OnlineExecution":
         """An execution to be stepped tick by tick with what the sensors say. Source: Algorithm 2, ExecuteAndMonitor.
 
         Parameters
@@ -209,6 +199,9 @@ class ProbabilisticDMP(HasFamiliarVerbs):
         on_alarm : `"continue"` or `"hold"`, what is commanded after an alarm; see `OnlineExecution`.
         feedback : names of the sensors that modulate the command, all unless given; the others are only watched.
         """
+        from probdmp.detection import FailureDetector
+        from probdmp.execution import OnlineExecution
+
         if not isinstance(detector, FailureDetector | None):
             raise InputTypeError("detector as a FailureDetector", f"{detector!r:.100}")
         start = np.full(self._learned().n_dof, np.nan) if start is None else start
@@ -222,13 +215,15 @@ class ProbabilisticDMP(HasFamiliarVerbs):
         goal: ArrayLike | None = None,
         duration: float | None = None,
         dt: float | None = None,
-        sensors: Sequence[Sensor] | None = None,
+        sensors: "Sequence[Sensor] | None" = None,
     ) -> FloatArray:
         """What a unit innovation of each output adds to the next command of `execute`: the paper's A K, (T - 1, D, 3, O) array.
 
         The order is acceleration, velocity, position. Sensors are linear and have no gate; see
         `probdmp.execution.feedback_gains`.
         """
+        from probdmp.execution import feedback_gains
+
         start = np.full(self._learned().n_dof, np.nan) if start is None else start
         task = task_for(self._learned(), start, goal, duration)
         return feedback_gains(self._learned(), task, self._step(dt), self._array(sensors))
@@ -238,7 +233,7 @@ class ProbabilisticDMP(HasFamiliarVerbs):
         executions: Recordings,
         dt: float | None = None,
         tasks: Sequence[Task] | None = None,
-        sensors: Sequence[Sensor] | None = None,
+        sensors: "Sequence[Sensor] | None" = None,
     ) -> FloatArray:
         """Total log-likelihood of each recorded execution, (N,) array, nats, computed side by side.
 
@@ -246,6 +241,8 @@ class ProbabilisticDMP(HasFamiliarVerbs):
         ----------
         tasks : what each was asked to do; its own first row and length and the learned goal unless given.
         """
+        from probdmp.execution import is_batch, own_batch, score_batch, score_recordings, task_of_recording
+
         primitive = self._learned()
         if tasks is None and sensors is None and is_batch(executions, primitive):
             return score_batch(primitive, own_batch(primitive, executions, self._step(dt)))
@@ -266,7 +263,7 @@ class ProbabilisticDMP(HasFamiliarVerbs):
         dt: float | None = None,
         start_velocity: ArrayLike | None = None,
         sensor_noise: bool = True,
-        random_state: int | np.random.Generator | None = None,
+        random_state: "int | np.random.Generator | None" = None,
     ) -> list[FloatArray]:
         """Draw executions from the model: a list of n_samples (T, D) arrays.
 
@@ -274,6 +271,8 @@ class ProbabilisticDMP(HasFamiliarVerbs):
         ----------
         sensor_noise : whether positions are as a sensor would record them, or as they are.
         """
+        from probdmp.execution import sample_trajectories
+
         task = task_for(self._learned(), start, goal, duration, start_velocity)
         count, rng = check_count(n_samples, "n_samples", most=MOST_SAMPLES), check_generator(random_state)
         return sample_trajectories(self._learned(), task, self._step(dt), count, rng, sensor_noise)
@@ -286,10 +285,12 @@ class ProbabilisticDMP(HasFamiliarVerbs):
         duration: float | None = None,
         dt: float | None = None,
         start_velocity: ArrayLike | None = None,
-        sensors: Sequence[Sensor] | None = None,
-        random_state: int | np.random.Generator | None = None,
+        sensors: "Sequence[Sensor] | None" = None,
+        random_state: "int | np.random.Generator | None" = None,
     ) -> list[Demonstration]:
         """Draw executions as sensors would record them; positions that none of them measures are missing."""
+        from probdmp.execution import sample_recordings
+
         task = task_for(self._learned(), start, goal, duration, start_velocity)
         count, rng = check_count(n_samples, "n_samples", most=MOST_SAMPLES), check_generator(random_state)
         return sample_recordings(self._learned(), task, self._step(dt), count, rng, self._array(sensors))
@@ -318,12 +319,12 @@ class ProbabilisticDMP(HasFamiliarVerbs):
 
     def learn_sensor_noise(
         self,
-        sensors: Sequence[Sensor],
+        sensors: "Sequence[Sensor]",
         demonstrations: Recordings,
         dt: float | None = None,
         tasks: Sequence[Task] | None = None,
         covariance: str = "as_given",
-    ) -> SensorNoise:
+    ) -> "SensorNoise":
         """The noise R of each sensor, by expectation maximisation over demonstrations that all of them have recorded.
 
         Parameters
@@ -334,11 +335,15 @@ class ProbabilisticDMP(HasFamiliarVerbs):
         covariance : `"as_given"`: a diagonal R stays diagonal; `"full"`, `"diagonal"`, or `"auto"`: the likelier of the two on
             demonstrations that were left out, sensor by sensor.
         """
+        from probdmp.execution import estimate_sensor_noise, task_of_recording
+
         primitive, recordings = self._learned(), as_demonstrations(demonstrations, self._step(dt))
         unknown = np.full(primitive.n_dof, np.nan)
         asked = tasks if tasks is not None else [task_of_recording(primitive, r, start=unknown) for r in recordings]
         return estimate_sensor_noise(primitive, sensors, asked, recordings, covariance)
 
-    def save(self, path: str | Path, detector: FailureDetector | None = None) -> None:
+    def save(self, path: "str | Path", detector: "FailureDetector | None" = None) -> None:
         """Write a model file, atomically, with the detector if given."""
+        from probdmp.estimator.saving import write_learned
+
         write_learned(path, {"": (self._learned(), self.get_params())}, detector)

@@ -2,15 +2,17 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from probdmp.detection import FailureDetector
 from probdmp.dmp import Primitive
 from probdmp.errors import InputError
 from probdmp.io import ModelContents, write_model
 from probdmp.io.model_contents import provenance_here
+
+if TYPE_CHECKING:
+    from probdmp.detection import FailureDetector
 
 __all__ = ["write_learned"]
 
@@ -18,7 +20,7 @@ __all__ = ["write_learned"]
 def write_learned(
     path: str | Path,
     learned: Mapping[str, tuple[Primitive, Mapping[str, Any]]],
-    detector: FailureDetector | None,
+    detector: "FailureDetector | None",
     command: str = "",
 ) -> None:
     """Write a model file, atomically.

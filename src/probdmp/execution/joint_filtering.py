@@ -28,8 +28,8 @@ from probdmp.gaussian import (
 __all__ = [
     "FilteredRecordings",
     "filter_joint",
+    "joint_covariances",
     "joint_position_covariances",
-    "roll_out_joint",
     "sample_joint",
     "smooth_all_joint",
     "smooth_joint",
@@ -101,33 +101,24 @@ def smooth_all_joint(
     return log_likelihood, means, covariances
 
 
-def roll_out_joint(executions: JointExecutions) -> GaussianSequence:
-    """All states given what is known before they begin: (T, N, S, 3) and (T, N, S, 3, 3)."""
-    (means, factors, (mean, covariance)), rows, system = executions
-    expected = means + np.matmul(factors, mean[:, None, :, None])[..., 0]
-    of_parameters = factors @ covariance[:, None] @ factors.mT  # (N, S, N + 3, N + 3)
-    each = rows[:, :, None]
-    covariances = each @ of_parameters @ each.mT
-    own, noise = np.zeros(covariances.shape[1:]), system.noise
-    for t in range(1, len(rows)):
-        own = system.transition @ own @ system.transition.mT + noise
-        covariances[t] += own
-    states = np.matmul(each, expected[..., None])[..., 0]
-    return GaussianSequence(states, (covariances + covariances.mT) / 2)
+def joint_covariances(executions: JointExecutions) -> FloatArray:
+    """Of all states given what is known before they begin, (T, N, S, 3, 3) array."""
+    (_, factors, belief), rows, system = executions
+    of_parameters = factors @ belief.covariance[:, None] @ factors.mT  # (N, S, N + 3, N + 3)
+    half = np.matmul(rows[:, :, None], of_parameters)
+    covariances = np.matmul(half, rows[:, :, None].mT)
+    covariances = (covariances + covariances.mT) / 2
+    return covariances + system.variances[..., None, None] * system.driven(len(rows))[:, :, None]
 
 
 def joint_position_covariances(executions: JointExecutions) -> FloatArray:
-    """Of `roll_out_joint`, what signals share too: (T, N, S, S) array, units of the signals multiplied."""
-    model, deviation = executions.model, start_deviation(executions.model, False)
-    covariances = []
-    for t, rows in enumerate(executions.rows):
-        if t > 0:
-            deviation = predict_deviation(deviation, executions.system.transition, executions.system.noise)
-        designs = state_designs(model, rows[..., [POSITION], :])[1][..., 0, :]
-        shared = linear_moments(model.belief, designs)[1]
-        own = deviation.covariance[..., POSITION, POSITION]  # nothing was observed, so deviations owe nothing to z
-        covariances.append(shared + own[..., None] * np.eye(own.shape[-1]))
-    return np.stack(covariances)
+    """Of positions, what signals share too: (T, N, S, S) array, units of the signals multiplied."""
+    (_, factors, belief), rows, system = executions
+    positions = rows[..., POSITION, :]
+    designs = np.matmul(positions[:, :, None, None], factors)[..., 0, :]  # (T, N, S, r)
+    covariances = designs @ belief.covariance @ designs.mT
+    own = system.variances * system.driven(len(rows))[..., POSITION, POSITION, None]
+    return np.asarray((covariances + covariances.mT) / 2 + own[..., None] * np.eye(own.shape[-1]))
 
 
 def start_deviation(model: JointModel, are_coupled: bool) -> Deviation:

@@ -13,7 +13,9 @@ def planned_states(executions: JointExecutions) -> FloatArray:
     model, rows = executions.model, executions.rows
     means = model.means + np.matmul(model.factors, model.belief.mean[:, None, :, None])[..., 0]
     if rows.shape[1] == 1:
-        return np.asarray(np.einsum("tkn,bsn->tbsk", rows[:, 0], means, optimize=True))
+        n_times, _, k, n = rows.shape  # one product of matrices for all
+        states = rows.reshape(-1, n) @ means.reshape(-1, n).T
+        return np.ascontiguousarray(np.moveaxis(states.reshape(n_times, k, *means.shape[:2]), 1, -1))
     return np.asarray(np.einsum("tbkn,bsn->tbsk", rows, means, optimize=True))
 
 

@@ -147,6 +147,13 @@ typedef struct {
     double *means, *covariances, *innovations, *variances, *log_likelihoods, *gains;
 } Systems;
 
+/* What filtered observations say of the states before them; see `smooth_backwards`. */
+typedef struct {
+    Py_ssize_t n_times, n_systems;
+    const double *a, *scores, *informations, *retentions, *means, *covariances;
+    double *smoothed_means, *smoothed_covariances;
+} Filtered;
+
 /* What is filtered is the deviation from the path expected without observations:
    d[t] = F[t-1] d[t-1] + g[t-1] y[t-1],  F = A - g c,  g = A K,    e[t] = y[t] - c d[t],  y = o - path */
 typedef struct {
@@ -217,6 +224,10 @@ typedef struct {
 #define score_all NAMED(score_all)
 #define smooth_all NAMED(smooth_all)
 
+#define product NAMED(product)
+#define smooth_system NAMED(smooth_system)
+#define smooth_each NAMED(smooth_each)
+
 #define pack NAMED(pack)
 #define square_outputs NAMED(square_outputs)
 #define mix_lane NAMED(mix_lane)
@@ -271,6 +282,7 @@ static void look_at_processor(void) {}
 #undef step_all
 #undef score_all
 #undef smooth_all
+#undef smooth_each
 
 /* ---- filter_systems ----------------------------------------------------------------------------------------------------- */
 
@@ -410,6 +422,31 @@ static PyObject *smoothed_states(PyObject *module, PyObject *const *arguments, P
     }
     release(x, COUNT);
     if (!done) return NULL;
+    Py_RETURN_NONE;
+}
+
+/* ---- smooth_backwards --------------------------------------------------------------------------------------------------- */
+
+static PyObject *smooth_backwards(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
+{
+    static const Spec specs[] = {
+        {"transition", 0, 3, 0}, {"scores", 0, 3, 0}, {"informations", 0, 4, 0}, {"retentions", 0, 4, 0}, {"means", 0, 3, 0},
+        {"covariances", 0, 4, 0}, {"smoothed_means", 1, 3, 0}, {"smoothed_covariances", 1, 4, 0},
+    };
+    enum { COUNT = sizeof(specs) / sizeof(specs[0]) };
+    Array x[COUNT];
+    if (take(arguments, given, specs, COUNT, x) < 0) return NULL;
+    const Py_ssize_t t = x[1].view.shape[0], m = x[0].view.shape[0], n = x[0].view.shape[1];
+    int fits = few_states(n) && agree(&x[0], specs[0].name, m, n, n, 0);
+    for (int i = 1; fits && i < COUNT; i++) fits = agree(&x[i], specs[i].name, t, m, n, n);
+    if (fits) {
+        Filtered filtered = {t, m, x[0].data, x[1].data, x[2].data, x[3].data, x[4].data, x[5].data, x[6].data, x[7].data};
+        Py_BEGIN_ALLOW_THREADS
+        CHOOSE(smooth_each)((int)n, &filtered);
+        Py_END_ALLOW_THREADS
+    }
+    release(x, COUNT);
+    if (!fits) return NULL;
     Py_RETURN_NONE;
 }
 
@@ -686,7 +723,7 @@ static PyObject *points_on_lines(PyObject *module, PyObject *const *arguments, P
 
 static PyMethodDef functions[] = {
     FUNCTION(filter_systems), FUNCTION(filter_step), FUNCTION(squared_innovations), FUNCTION(smoothed_states),
-    FUNCTION(least_squares), FUNCTION(window_evidence), FUNCTION(window_ratios), FUNCTION(whiten),
+    FUNCTION(smooth_backwards), FUNCTION(least_squares), FUNCTION(window_evidence), FUNCTION(window_ratios), FUNCTION(whiten),
     FUNCTION(plain_recordings), FUNCTION(points_on_lines),
     {NULL, NULL, 0, NULL},
 };
@@ -1208,6 +1245,62 @@ static void smooth_all(int n, const Series *s, const double *predicted, const do
             take_apart(together, steps * d * n, size * n, s->n_series - first, smoothed + (first * size + start * d) * n);
         }
     }
+}
+
+/* ---- smooth_backwards --------------------------------------------------------------------------------------------------- */
+
+/* X Y, or X^T Y */
+INLINE void product(int n, int is_transposed, const double *x, const double *y, double *xy)
+{
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < n; j++) {
+            double sum = 0;
+            for (int k = 0; k < n; k++) sum += (is_transposed ? x[k * n + i] : x[i * n + k]) * y[k * n + j];
+            xy[i * n + j] = sum;
+        }
+}
+
+/* One system, from its last time on: l = A^T (score + kept^T l), L = A^T (information + kept^T L kept) A. */
+INLINE void smooth_system(int n, const Filtered *s, Py_ssize_t i)
+{
+    double l[MOST_STATES] = {0}, information[MOST_STATES * MOST_STATES] = {0};
+    double told[MOST_STATES], some[MOST_STATES * MOST_STATES], other[MOST_STATES * MOST_STATES];
+    const double *a = s->a + i * n * n;
+    for (Py_ssize_t t = s->n_times - 1; t >= 0; t--) {
+        const Py_ssize_t here = t * s->n_systems + i;
+        const double *v = s->covariances + here * n * n, *m = s->means + here * n;
+        double *covariance = s->smoothed_covariances + here * n * n, *mean = s->smoothed_means + here * n;
+        product(n, 0, v, information, some);
+        product(n, 0, some, v, other);
+        for (int j = 0; j < n; j++) {
+            mean[j] = m[j];
+            for (int k = 0; k < n; k++) {
+                mean[j] += v[j * n + k] * l[k];
+                covariance[j * n + k] = v[j * n + k] - (other[j * n + k] + other[k * n + j]) / 2;
+            }
+        }
+        const double *kept = s->retentions + here * n * n, *shown = s->informations + here * n * n;
+        product(n, 1, kept, information, some);
+        product(n, 0, some, kept, other);
+        for (int j = 0; j < n * n; j++) other[j] += shown[j];
+        product(n, 1, a, other, some);
+        product(n, 0, some, a, information);
+        for (int j = 0; j < n; j++) {
+            told[j] = s->scores[here * n + j];
+            for (int k = 0; k < n; k++) told[j] += kept[k * n + j] * l[k];
+        }
+        for (int j = 0; j < n; j++) {
+            l[j] = 0;
+            for (int k = 0; k < n; k++) l[j] += a[k * n + j] * told[k];
+        }
+    }
+}
+
+static void smooth_each(int n, const Filtered *filtered)
+{
+#define BODY(k) for (Py_ssize_t i = 0; i < filtered->n_systems; i++) smooth_system(k, filtered, i)
+    WITH_STATES(n, BODY)
+#undef BODY
 }
 
 /* ---- Windows ------------------------------------------------------------------------------------------------------------ */

@@ -24,6 +24,7 @@ __all__ = [
     "least_squares",
     "plain_recordings",
     "points_on_lines",
+    "smooth_backwards",
     "smoothed_states",
     "split_sums",
     "squared_innovations",
@@ -183,6 +184,36 @@ def smoothed_states(
             rho = sensor.T[..., None] * weighted + np.einsum("dkn,kdj->ndj", closed_loop[t], rho)
             corrected = predicted[t] + np.einsum("dnk,kdj->ndj", predicted_covariances[t], rho)
             smoothed[block, t] = path_states[t] + np.moveaxis(corrected, -1, 0).mT
+
+
+def smooth_backwards(
+    transition: FloatArray,
+    scores: FloatArray,
+    informations: FloatArray,
+    retentions: FloatArray,
+    means: FloatArray,
+    covariances: FloatArray,
+    smoothed_means: FloatArray,
+    smoothed_covariances: FloatArray,
+) -> None:
+    """What the observations after each time say of its states, for M independent systems that have been filtered.
+
+    Parameters
+    ----------
+    transition : A, (M, n, n) array.
+    scores, informations, retentions : C^T S^-1 e, C^T S^-1 C and I - K C, (T, M, n) and (T, M, n, n) arrays.
+    means, covariances : of the filter, (T, M, n) and (T, M, n, n) arrays.
+    smoothed_means, smoothed_covariances : written, likewise.
+    """
+    score, information = np.zeros_like(means[0]), np.zeros_like(covariances[0])
+    for t in range(len(means) - 1, -1, -1):
+        v, kept = covariances[t], retentions[t]
+        correction = v @ information @ v
+        smoothed_means[t] = means[t] + np.matmul(v, score[..., None])[..., 0]
+        smoothed_covariances[t] = v - (correction + correction.mT) / 2
+        told = scores[t] + np.matmul(kept.mT, score[..., None])[..., 0]
+        score = np.matmul(transition.mT, told[..., None])[..., 0]
+        information = transition.mT @ (informations[t] + kept.mT @ information @ kept) @ transition
 
 
 def _responses(closed_loop: FloatArray, feedback: FloatArray, sensor: FloatArray, precisions: FloatArray) -> FloatArray:

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from itertools import pairwise
 from types import ModuleType
 
+from probdmp.checks import FloatArray
 from probdmp.gaussian import _kernels_numpy
 
 __all__ = [
@@ -21,6 +22,7 @@ __all__ = [
     "least_squares",
     "plain_recordings",
     "points_on_lines",
+    "smooth_backwards",
     "smoothed_states",
     "split_sums",
     "squared_innovations",
@@ -56,6 +58,13 @@ filter_systems: Callable[..., None] = _kernels.filter_systems
 filter_step: Callable[..., int] = _kernels.filter_step
 squared_innovations: Callable[..., None] = _kernels.squared_innovations
 smoothed_states: Callable[..., None] = _kernels.smoothed_states
+
+
+def smooth_backwards(transition: FloatArray, *others: FloatArray) -> None:
+    """As in `_kernels_numpy`: systems of more than `MOST_STATES` states are smoothed there."""
+    (_kernels if transition.shape[-1] <= MOST_STATES else _kernels_numpy).smooth_backwards(transition, *others)
+
+
 least_squares: Callable[..., None] = _kernels.least_squares
 window_evidence: Callable[..., None] = _kernels.window_evidence
 window_ratios: Callable[..., None] = _kernels.window_ratios

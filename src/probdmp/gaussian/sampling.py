@@ -8,14 +8,14 @@ from probdmp.gaussian.model import LinearGaussianModel
 __all__ = ["sample_sequences"]
 
 
-def _draw(rng: np.random.Generator, covariance: FloatArray, shape: tuple[int, ...]) -> FloatArray:
+def _draw(rng: "np.random.Generator", covariance: FloatArray, shape: tuple[int, ...]) -> FloatArray:
     """Zero-mean Gaussian draws of the given shape; semi-definite covariances are fine."""
     eigenvalues, eigenvectors = np.linalg.eigh(covariance)
     scaled = rng.standard_normal(shape) * np.sqrt(np.maximum(eigenvalues, 0))
     return np.matmul(eigenvectors, scaled[..., None])[..., 0]
 
 
-def sample_sequences(model: LinearGaussianModel, n_samples: int, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+def sample_sequences(model: LinearGaussianModel, n_samples: int, rng: "np.random.Generator") -> tuple[FloatArray, FloatArray]:
     """Draw whole sequences.
 
     Returns

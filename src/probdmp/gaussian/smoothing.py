@@ -12,6 +12,7 @@ Bryson-Frazier form; Durbin & Koopman, Time Series Analysis by State Space Metho
 import numpy as np
 
 from probdmp.checks import FloatArray
+from probdmp.gaussian import kernels
 from probdmp.gaussian.density import invert_covariance
 from probdmp.gaussian.filtering import FilteredSequence, filter_sequence
 from probdmp.gaussian.model import GaussianSequence, LinearGaussianModel
@@ -31,22 +32,21 @@ def smooth_sequence(model: LinearGaussianModel, observations: FloatArray) -> Gau
 
 def smooth_filtered(model: LinearGaussianModel, forward: FilteredSequence) -> GaussianSequence:
     """The backward pass alone, for a recording that has been filtered with the same model."""
-    a, (means, covariances) = model.transition, forward.filtered
+    means, covariances = (np.ascontiguousarray(x) for x in forward.filtered)
     # What was not fused has a zero row in C and a unit variance, as in the filter.
     fused, identity = forward.fused, np.eye(forward.fused.shape[-1])
     c = np.where(fused[..., None], forward.matrices, 0.0)
     s = np.where(fused[..., :, None] & fused[..., None, :], forward.innovation_covariances, identity)
     weighted = c.mT @ invert_covariance(s)[0]  # C^T S^-1
     scores = np.matmul(weighted, np.where(fused, forward.innovations, 0.0)[..., None])[..., 0]
-    informations, retentions = weighted @ c, np.eye(a.shape[-1]) - forward.gains @ c
-    smoothed_means, smoothed_covariances = means.copy(), covariances.copy()
-    score, information = np.zeros_like(means[0]), np.zeros_like(covariances[0])
-    for t in range(model.n_steps - 1, 0, -1):
-        kept = retentions[t]
-        score = np.matmul(a.mT, (scores[t] + np.matmul(kept.mT, score[..., None])[..., 0])[..., None])[..., 0]
-        information = a.mT @ (informations[t] + kept.mT @ information @ kept) @ a
-        v = covariances[t - 1]
-        smoothed_means[t - 1] += np.matmul(v, score[..., None])[..., 0]
-        correction = v @ information @ v
-        smoothed_covariances[t - 1] -= (correction + correction.mT) / 2
-    return GaussianSequence(smoothed_means, smoothed_covariances)
+    retentions = np.eye(means.shape[-1]) - forward.gains @ c
+    smoothed = GaussianSequence(np.empty_like(means), np.empty_like(covariances))
+
+    def of_systems(of_state: FloatArray) -> FloatArray:  # the batch as one axis
+        return of_state.reshape(len(means), -1, *of_state.shape[means.ndim - 1 :])
+
+    kernels.smooth_backwards(
+        np.ascontiguousarray(np.broadcast_to(model.transition, covariances.shape[1:])).reshape(-1, *covariances.shape[-2:]),
+        *map(of_systems, (scores, weighted @ c, retentions, means, covariances, *smoothed)),
+    )
+    return smoothed

@@ -62,21 +62,45 @@ class SignalEstimate(NamedTuple):
 class _Posteriors(NamedTuple):
     means: FloatArray
     """m_k, (K, P)."""
-    covariance: FloatArray
-    """C, (P, P)."""
+    prior: FloatArray
+    """Sigma of the E step, (P, P)."""
+    spread: FloatArray
+    """Sigma U^T, (P, Q), U the part of the designs that says all that they say of the parameters."""
+    solved: FloatArray
+    """(1 + U Sigma U^T)^-1 U Sigma, (Q, P)."""
+
+    def covariance(self) -> FloatArray:
+        """C, (P, P)."""
+        posterior = self.prior - self.spread @ self.solved
+        return (posterior + posterior.T) / 2
+
+    def own_covariances(self, n_signals: int) -> FloatArray:
+        """Those blocks of C that belong to one signal each, (S, n, n)."""
+        n, own = len(self.prior) // n_signals, np.arange(n_signals)
+        blocks = self.prior.reshape(n_signals, n, n_signals, n)[own, :, own]
+        taken = self.spread.reshape(n_signals, n, -1) @ self.solved.reshape(-1, n_signals, n).swapaxes(0, 1)
+        return np.asarray(blocks - (taken + taken.mT) / 2)
 
 
 class _Problem(NamedTuple):
     """All in units of each signal's range, so that nothing has a unit."""
 
     designs: FloatArray
-    """H, (M, n) array, n parameters of each signal; with channels a column of ones goes first."""
+    """H = Q U, (M, n) array, n parameters of each signal; with channels a column of ones goes first."""
     paths: FloatArray
     """y, (K, M, S)."""
+    roots: FloatArray
+    """U, (q, n) array, q <= n."""
+    told: FloatArray
+    """Q^T y, (K, q, S): what paths say of the parameters."""
     has_goal: FloatArray
     """(S,) one for degrees of freedom, which end at their goal; zero for channels."""
     goal: int
     """Which parameter that is."""
+
+    def mean(self) -> "_Problem":
+        """The same of the mean path alone."""
+        return self._replace(paths=self.paths.mean(axis=0, keepdims=True), told=self.told.mean(axis=0, keepdims=True))
 
 
 def estimate_variation(
@@ -95,7 +119,9 @@ def estimate_variation(
     k, m, n_signals = paths.shape
     designs = np.concatenate([np.ones((m, 1)), responses], axis=1) if n_channels else responses
     has_goal = np.where(np.arange(n_signals) < n_signals - n_channels, 1.0, 0.0)
-    problem = _Problem(designs, paths / ranges, has_goal, designs.shape[1] - responses.shape[1] + GOAL)
+    orthogonal, roots = np.linalg.qr(designs)
+    goal = designs.shape[1] - responses.shape[1] + GOAL
+    problem = _Problem(designs, paths / ranges, roots, orthogonal.T @ (paths / ranges), has_goal, goal)
     mean_path = problem.paths.mean(axis=0)
     variances = np.full(n_signals, SINGLE_STD**2)
     if k > 1:
@@ -117,8 +143,7 @@ def _maximize(
 ) -> tuple[FloatArray, FloatArray, FloatArray, _Posteriors]:
     """mu (P), Sigma (P, P) and R (S), and what is then known of the demonstrations."""
     residuals, covariance = np.maximum(0.01 * variances, LEAST_RESIDUAL**2), prior
-    average = problem._replace(paths=problem.paths.mean(axis=0, keepdims=True))
-    mean = _posteriors(average, np.zeros(len(prior)), 100 * prior, residuals).means[0]
+    mean = _posteriors(problem.mean(), np.zeros(len(prior)), 100 * prior, residuals).means[0]
     for _ in range(MOST_ITERATIONS):
         posteriors = _posteriors(problem, mean, covariance, residuals)
         mean = posteriors.means.mean(axis=0)
@@ -133,7 +158,7 @@ def _maximize(
 def _between(posteriors: _Posteriors, prior: FloatArray, n_signals: int, is_coupled: bool) -> FloatArray:
     """Sigma of the M step."""
     deviations = posteriors.means - posteriors.means.mean(axis=0)
-    between = deviations.T @ deviations / (len(deviations) - 1) + posteriors.covariance
+    between = deviations.T @ deviations / (len(deviations) - 1) + posteriors.covariance()
     covariance = (1 - PRIOR_WEIGHT) * between + PRIOR_WEIGHT * prior
     if not is_coupled:
         size = len(prior) // n_signals
@@ -178,29 +203,28 @@ def _posteriors(problem: _Problem, mean: FloatArray, covariance: FloatArray, res
     mean, covariance : mu and Sigma, (P) and (P, P).
     residuals : R, (S,), in units of the range squared, as all else.
     """
-    designs, paths, has_goal, goal = problem
-    (k, m, n_signals), n = paths.shape, designs.shape[1]
-    # What is seen of the parameters of each signal, with unit noise: Q U theta + e. U^T U is the information.
-    rows = np.concatenate([np.tile(designs, (n_signals, 1, 1)), np.tile(np.eye(n)[goal], (n_signals, 1, 1))], axis=1)
-    weights = np.concatenate([np.tile(residuals**-0.5, (m, 1)), has_goal[None] / GOAL_TOLERANCE])
-    orthogonal, roots = np.linalg.qr(rows * weights.T[..., None])
-    seen = np.concatenate([paths, paths[:, -1:]], axis=1) - (rows @ mean.reshape(n_signals, n, 1))[..., 0].T
-    told = np.moveaxis(np.matmul((seen * weights).transpose(2, 0, 1), orthogonal), 0, 1).reshape(k, -1)
+    n_signals, n = len(residuals), problem.roots.shape[1]
+    goals = np.broadcast_to(np.eye(n)[problem.goal], (n_signals, 1, n))
+    rows = np.concatenate([np.broadcast_to(problem.roots, (n_signals, *problem.roots.shape)), goals], axis=1)
+    precisions = np.concatenate([np.tile(residuals**-0.5, (len(problem.roots), 1)), problem.has_goal[None] / GOAL_TOLERANCE])
+    seen = np.concatenate([problem.told, problem.paths[:, -1:]], axis=1)
+    seen = (seen - (rows @ mean.reshape(n_signals, n, 1))[..., 0].T) * precisions
+    rows = rows * precisions.T[..., None]  # now with unit noise
+    told = np.moveaxis(seen, 2, 1).reshape(len(seen), -1)
     # C = Sigma - Sigma U^T (1 + U Sigma U^T)^-1 U Sigma: Sigma may be singular, and no parameter needs to vary.
-    spread = np.matmul(covariance.reshape(-1, n_signals, 1, n), roots.mT[None])[..., 0, :].reshape(len(mean), -1)
+    by_signal = covariance.reshape(-1, n_signals, n).swapaxes(0, 1) @ rows.mT
+    spread = by_signal.swapaxes(0, 1).reshape(len(mean), -1)
     size = spread.shape[1]
-    inner = np.eye(size) + np.matmul(roots, spread.reshape(n_signals, n, -1)).reshape(size, -1)
+    inner = np.eye(size) + np.matmul(rows, spread.reshape(n_signals, n, -1)).reshape(size, -1)
     solved = np.linalg.solve(inner, np.concatenate([spread.T, told.T], axis=1))
-    posterior = covariance - spread @ solved[:, : len(mean)]
-    return _Posteriors(mean + (spread @ solved[:, len(mean) :]).T, (posterior + posterior.T) / 2)
+    means = mean + (spread @ solved[:, len(mean) :]).T
+    return _Posteriors(means, covariance, spread, solved[:, : len(mean)])
 
 
 def _residual_variances(problem: _Problem, posteriors: _Posteriors) -> FloatArray:
     """R, (S,) array; the start of a degree of freedom, which is zero by definition, says nothing."""
-    designs, paths = problem.designs, problem.paths
-    (k, m, n_signals), n = paths.shape, designs.shape[1]
-    errors = paths - np.einsum("mn,kdn->kmd", designs, posteriors.means.reshape(k, n_signals, n))
-    own = np.arange(n_signals)
-    blocks = posteriors.covariance.reshape(n_signals, n, n_signals, n)[own, :, own]
-    spread = np.einsum("mn,dno,mo->d", designs, blocks, designs, optimize=True)
+    (k, m, n_signals), n = problem.paths.shape, problem.roots.shape[1]
+    means = posteriors.means.reshape(k, n_signals, n)
+    errors = problem.paths - problem.designs @ means.mT
+    spread = np.sum((problem.roots @ posteriors.own_covariances(n_signals)) * problem.roots, axis=(1, 2))
     return np.asarray((np.sum(errors**2, axis=(0, 1)) / k + spread) / (m - problem.has_goal))

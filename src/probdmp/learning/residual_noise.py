@@ -12,10 +12,10 @@ a search: scaled together, they scale S, and the best scale is the mean of (e^2 
 Source: Durbin & Koopman, Time Series Analysis by State Space Methods, section 2.10, the concentrated likelihood.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from probdmp.checks import FloatArray
 from probdmp.dmp import Primitive, Task
@@ -23,6 +23,7 @@ from probdmp.dmp.deviations import DeviationSystem, deviation_system, lasting_va
 from probdmp.dmp.joint_model import JointExecutions, joint_executions
 from probdmp.dmp.transformation_system import POSITION, VELOCITY
 from probdmp.gaussian import kernels
+from probdmp.gaussian.scalar_systems import ScalarSystems, filter_scalar_systems
 
 __all__ = ["with_residual_noise"]
 
@@ -34,23 +35,30 @@ LEAST_VARIANCE = 1e-12
 MOST_TIMES = 100
 """How many times of a demonstration tell its parameters, about; residuals closer than that are not independent."""
 
+SIDE_BY_SIDE = 256
+"""Residuals that are filtered at once, about: more would not stay in the cache."""
+
 
 class _Residuals(NamedTuple):
     errors: FloatArray
-    """r, (T, D, K) array, data units; NaN at the start, which is told, and after the end of a demonstration."""
+    """r, (T, S, K) array, data units; NaN at the start, which is told, and after the end of a demonstration."""
     spreads: FloatArray
-    """(T, D, r) array, data units: a square root of the covariance H C H^T of one demonstration, of middle length."""
+    """(T, S, q) array, data units: a square root of the covariance H C H^T of one demonstration, of middle length."""
     typical: int
     """Which one."""
 
 
-class _Gains(NamedTuple):
-    velocity: FloatArray
-    """(T, G, D or 1, K) array."""
-    position: FloatArray
-    """(T, G, D or 1, K) array."""
+class _Filtered(NamedTuple):
+    """Of G ratios, and residuals as above, without NaN."""
+
+    squares: FloatArray
+    """Sums of e^2 / S, (G, S, K) array."""
+    logs: FloatArray
+    """Sums of ln S, (G, S, K) array."""
+    gains: FloatArray
+    """Of velocity and position of the typical demonstration, (T, G, S, 2) array."""
     variances: FloatArray
-    """S, (T, G, D or 1, K) array."""
+    """S of the same, (T, G, S) array."""
 
 
 def with_residual_noise(primitive: Primitive, tasks: Task, dts: FloatArray, observed: FloatArray) -> Primitive:
@@ -80,112 +88,105 @@ def with_residual_noise(primitive: Primitive, tasks: Task, dts: FloatArray, obse
 
 def _residuals(primitive: Primitive, executions: JointExecutions, observed: FloatArray) -> _Residuals:
     """What is left of the demonstrations by their parameters, which a part of their times tells."""
-    model, rows = executions.model, np.moveaxis(executions.rows[..., POSITION, :], 0, 1)[:, None]
-    designs = rows @ model.factors  # (K, D, T, r)
-    errors = np.nan_to_num(np.moveaxis(observed, 0, -1) - (rows @ model.means[..., None])[..., 0])
-    seen = ~np.isnan(np.moveaxis(observed, 0, -1))
+    (offsets, factors, (mean, prior)), rows = executions.model, np.moveaxis(executions.rows[..., POSITION, :], 0, 1)
+    (k, *_, r), step = factors.shape, -(-len(observed) // MOST_TIMES)
+    values = np.moveaxis(observed, 0, -1)  # (K, S, T)
+    seen = ~np.isnan(values)
     seen[..., 0] = False
-    (k, *_, r), step = designs.shape, -(-len(observed) // MOST_TIMES)
-    weights = (seen / primitive.signals.observation_variances[:, None])[..., ::step].reshape(k, -1, 1)
-    some = designs[:, :, ::step].reshape(k, -1, r)
-    mean, prior = model.belief
-    surprise = errors[..., ::step].reshape(k, -1, 1) - some @ mean[..., None]
-    covariances = np.linalg.solve(np.eye(r) + prior @ (some.mT @ (some * weights)), prior)
-    means = mean + (covariances @ (some.mT @ (weights * surprise)))[..., 0]
-    left = np.where(seen, errors - np.matmul(designs, means[:, None, :, None])[..., 0], np.nan)
+    errors = np.nan_to_num(values) - (offsets + np.matmul(factors, mean[:, None, :, None])[..., 0]) @ rows.mT
+    weights, some = (seen / primitive.signals.observation_variances[:, None])[..., ::step], rows[:, ::step]
+    of_parameters = (some.mT[:, None] * weights[..., None, :]) @ some[:, None]  # what is seen of those of each signal
+    all_factors = factors.reshape(k, -1, r)
+    information = all_factors.mT @ (of_parameters @ factors).reshape(k, -1, r)
+    score = all_factors.mT @ ((weights * errors[..., ::step]) @ some).reshape(k, -1, 1)
+    inverse = np.eye(r) + prior @ information
+    moved = np.matmul(factors, np.linalg.solve(inverse, prior @ score)[:, None])[..., 0]  # (K, S, N + 3)
+    left = np.where(seen, errors - moved @ rows.mT, np.nan)
     lengths = observed.shape[0] - np.argmax(np.logical_or.reduce(seen, axis=1)[:, ::-1], axis=-1)
     typical = int(np.argsort(lengths)[k // 2])
-    eigenvalues, vectors = np.linalg.eigh((covariances[typical] + covariances[typical].T) / 2)
-    spreads = designs[typical, :, : lengths[typical]] @ (vectors * np.sqrt(np.maximum(eigenvalues, 0.0)))
-    return _Residuals(left.T, np.moveaxis(spreads, 0, 1), typical)
+    covariance = np.linalg.solve(inverse[typical], prior[typical if len(prior) > 1 else 0])
+    return _Residuals(left.T, _path_roots(rows[typical, : lengths[typical]], factors[typical], covariance), typical)
+
+
+def _path_roots(rows: FloatArray, factors: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Square roots of the covariances of paths of each signal, (T, S, q) array, q at most N + 3.
+
+    Parameters
+    ----------
+    rows : (T, N + 3) array.
+    factors : of each signal, (S, N + 3, r) array.
+    covariance : of z, (r, r) array.
+    """
+    orthogonal, upper = np.linalg.qr(rows)
+    designs = upper @ factors
+    of_paths = designs @ covariance @ designs.mT
+    eigenvalues, vectors = np.linalg.eigh((of_paths + of_paths.mT) / 2)
+    return np.moveaxis(orthogonal @ (vectors * np.sqrt(np.maximum(eigenvalues, 0.0))[:, None]), 0, 1)
 
 
 def _likelihoods(residuals: _Residuals, system: DeviationSystem, variances: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Concentrated log-likelihood but for a constant, and the best R, (G, D) arrays.
+    """Concentrated log-likelihood but for a constant, and the best R, (G, S) arrays.
 
     Parameters
     ----------
     system : of the K demonstrations, driven by unit noise.
-    variances : 1 / (beta R), (G, D or 1) array.
+    variances : 1 / (beta R), (G, S or 1) array.
     """
     errors, spreads, typical = residuals
-    counted = ~np.isnan(errors)
-    gains = _gains(system, variances, _gaps(counted))
-    shared = _Gains(*(x[: len(spreads), ..., [typical]] for x in gains))
-    moves = system.transition[:, 0, VELOCITY:, VELOCITY:]
-    squares = _squared_innovations(np.where(counted, errors, 0.0), counted[:, None] / gains.variances, gains, moves)
-    n = counted[:, 0].sum()
-    per_time = _squared_spreads(spreads, shared, moves[typical]) / (len(spreads) - 1)
-    scales = squares.sum(axis=-1) / n + per_time
-    logs = np.sum(counted[:, None] * np.log(gains.variances), axis=(0, -1))
-    return -0.5 * (n * np.log(scales) + logs), scales
+    n_ratios, (_, n_signals, k) = len(variances), errors.shape
+    variances = np.broadcast_to(variances, (n_ratios, n_signals))
+    together = max(1, SIDE_BY_SIDE // (n_signals * k))
+    parts = [_filtered(errors, system, variances[g : g + together], typical) for g in range(0, n_ratios, together)]
+    filtered = _Filtered(*(np.concatenate(x, axis=a) for x, a in zip(zip(*parts, strict=True), (0, 0, 1, 1), strict=True)))
+    n, move = np.sum(~np.isnan(errors[:, 0])), system.transition[typical, 0, VELOCITY:, VELOCITY:]
+    scales = filtered.squares.sum(axis=-1) / n + _squared_spreads(spreads, filtered, move) / (len(spreads) - 1)
+    return -0.5 * (n * np.log(scales) + filtered.logs.sum(axis=-1)), scales
 
 
-def _gaps(counted: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Where nothing was measured before the end of a demonstration, (T, D, K); (T, 1, 1) if that never was."""
-    ahead = np.logical_or.accumulate(counted[::-1])[::-1]
-    gaps = ahead & ~counted
-    return gaps if gaps[1:].any() else gaps[:, :1, :1]
+def _filtered(errors: FloatArray, system: DeviationSystem, variances: FloatArray, typical: int) -> _Filtered:
+    """Residuals filtered for a sensor of unit variance and inputs of the given variances, (G, S)."""
+    n_times, n_signals, k = errors.shape
+    shape = (len(variances), n_signals, k)
+    m = math.prod(shape)
+
+    def of_all(array: FloatArray, *core: int) -> FloatArray:
+        return np.ascontiguousarray(np.broadcast_to(array, (*shape, *core))).reshape(m, *core)
+
+    systems = ScalarSystems(
+        of_all(system.transition[:, 0, VELOCITY:, VELOCITY:], 2, 2),
+        of_all(system.input_vector[:, 0, VELOCITY:], 2),
+        np.zeros((n_times - 1, m, 2)),
+        np.tile(of_all(variances[..., None] * system.variances[:, 0]), (n_times - 1, 1)),
+        np.tile([0.0, 1.0], (m, 1)),
+        np.ones(m),
+        np.zeros((m, 2)),
+        np.zeros((m, 2, 2)),
+    )
+    observed = np.broadcast_to(errors[:, None], (n_times, *shape)).reshape(n_times, m)
+    found = filter_scalar_systems(systems, observed)
+    counted = ~np.isnan(observed)
+    squares = np.sum(np.where(counted, found.innovations, 0.0) ** 2 / found.variances, axis=0).reshape(shape)
+    logs = np.sum(np.log(found.variances), axis=0, where=counted).reshape(shape)
+    gains, spread = found.gains.reshape(n_times, *shape, 2), found.variances.reshape(n_times, *shape)
+    return _Filtered(squares, logs, gains[..., typical, :], spread[..., typical])
 
 
-def _gains(system: DeviationSystem, variances: FloatArray, gaps: NDArray[np.bool_]) -> _Gains:
-    """Kalman gains for a sensor of unit variance and inputs of the given variances, (G, D or 1)."""
-    (a, b), (c, e) = np.moveaxis(system.transition[:, 0, VELOCITY:, VELOCITY:], 0, -1)
-    noise_v, noise_p = system.input_vector[:, 0, VELOCITY:].T
-    q = variances[..., None] * system.variances[:, 0]
-    q_vv, q_vp, q_pp = q * noise_v**2, q * noise_v * noise_p, q * noise_p**2
-    vv = vp = pp = np.zeros(np.broadcast_shapes(q.shape, gaps.shape[1:]))
-    steps = [(vp, pp, pp + 1)]
-    for gap in gaps[1:]:
-        av, ap, cv, cp = a * vv + b * vp, a * vp + b * pp, c * vv + e * vp, c * vp + e * pp
-        vv, vp, pp = a * av + b * ap + q_vv, c * av + e * ap + q_vp, c * cv + e * cp + q_pp
-        s = pp + 1
-        weight = np.where(gap, 0.0, 1 / s)
-        gain_v, gain_p = vp * weight, pp * weight
-        steps.append((gain_v, gain_p, s))
-        vv, vp, pp = vv - gain_v * vp, vp - gain_v * pp, pp - gain_p * pp
-    return _Gains(*(np.stack(x) for x in zip(*steps, strict=True)))
-
-
-def _squared_innovations(paths: FloatArray, weights: FloatArray, gains: _Gains, moves: FloatArray) -> FloatArray:
-    """Weighted sums over time of squared innovations, (G, D, C) array.
-
-    Parameters
-    ----------
-    paths : (T, D, C) array, what is filtered.
-    weights : (T, G, D or 1, C or 1) array.
-    moves : A of velocity and position, (C or 1, 2, 2).
-    """
-    (a, b), (c, e) = np.moveaxis(moves, 0, -1)
-    v = p = np.zeros(np.broadcast_shapes(weights.shape[1:], paths.shape[1:]))
-    squares = np.zeros_like(v)
-    for path, weight, gain_v, gain_p in zip(paths[1:], weights[1:], gains.velocity[1:], gains.position[1:], strict=True):
-        expected = c * v + e * p
-        innovation = path - expected
-        v = a * v + b * p + gain_v * innovation
-        p = expected + gain_p * innovation
-        squares += weight * innovation**2
-    return squares
-
-
-def _squared_spreads(spreads: FloatArray, gains: _Gains, move: FloatArray) -> FloatArray:
-    """The same sums of all columns of `spreads`, (T, D, C), which share their gains, (T, G, D or 1, 1): (G, D) array.
+def _squared_spreads(spreads: FloatArray, filtered: _Filtered, move: FloatArray) -> FloatArray:
+    """The same sums of all columns of `spreads`, (T, S, q), which share the gains of the typical demonstration: (G, S) array.
 
     Parameters
     ----------
     move : A of velocity and position, (2, 2).
     """
-    n_times, n_dof, n_columns = spreads.shape
+    n_times, n_signals, n_columns = spreads.shape
     series = np.ascontiguousarray(np.moveaxis(spreads[1:], -1, 0))
-    planned, squares = np.zeros((1, n_times - 1, n_dof)), np.empty((n_columns, n_dof))
-    sensor = np.tile([0.0, 1.0], (n_dof, 1))
+    planned, squares = np.zeros((1, n_times - 1, n_signals)), np.empty((n_columns, n_signals))
+    sensor = np.tile([0.0, 1.0], (n_signals, 1))
     sums = []
-    for g in range(gains.variances.shape[1]):
-        own = np.stack([gains.velocity[1:, g, :, 0], gains.position[1:, g, :, 0]], axis=-1)
-        feedback = np.broadcast_to(own @ move.T, (n_times - 1, n_dof, 2))
+    for g in range(filtered.gains.shape[1]):
+        feedback = filtered.gains[1:n_times, g] @ move.T
         closed_loop = move - feedback[..., None] * sensor[:, None, :]
-        precisions = np.broadcast_to(1 / gains.variances[1:, g, :, 0], planned.shape[1:])
-        shared = (np.ascontiguousarray(closed_loop), np.ascontiguousarray(feedback), sensor, np.ascontiguousarray(precisions))
-        kernels.squared_innovations(*shared, series, planned, squares)
+        precisions = 1 / filtered.variances[1:n_times, g]
+        kernels.squared_innovations(closed_loop, feedback, sensor, precisions, series, planned, squares)
         sums.append(squares.sum(axis=0))
     return np.stack(sums)
