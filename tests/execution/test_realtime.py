@@ -137,14 +137,16 @@ def test_ten_million_ticks_leave_a_covariance_a_covariance():
     system[:9], system[9:12], system[14] = a.ravel()[:, None], np.array([[1.0], [dt], [dt**2]]), 1.0
     system[15] = np.repeat([1e-12, 1e-2, 1e-12, 1e-2], 2)
     inputs[3] = np.repeat([1e-8, 1e-8, 1.0, 1.0], 2) * 156.25**2
-    records, rng = np.zeros((2, n + n * n + 4, width)), np.random.default_rng(0)
+    prepared, rng = kernels.PreparedSteps(system, inputs[None], width), np.random.default_rng(0)
+    record = bytes(8 * width * (n + n * n + 3))
     readings = np.where(rng.random((1000, width)) < 0.1, np.nan, 1e-3 * rng.standard_normal((1000, width)))
     for _ in range(10_000):
-        for i, reading in enumerate(readings):
-            kernels.filter_step(system, inputs[None], reading, records[i % 2], records[1 - i % 2], 0)
-        covariances = records[0, n : n + n * n].T.reshape(width, n, n)
+        for reading in readings:
+            record = prepared.take(reading, record, 0)[3]
+        rows = np.frombuffer(record).reshape(-1, width)
+        covariances = rows[n : n + n * n].T.reshape(width, n, n)
         assert np.array_equal(covariances, covariances.mT)
         stds = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
         scaled = covariances / (stds[:, :, None] * stds[:, None, :])
         assert np.linalg.eigvalsh(scaled).min() > -1e-12
-    assert np.all(np.isfinite(records[0, : n + n * n]))
+    assert np.all(np.isfinite(rows[: n + n * n]))

@@ -271,43 +271,135 @@ static PyObject *filter_systems(PyObject *module, PyObject *const *arguments, Py
     Py_RETURN_NONE;
 }
 
-/* ---- filter_step -------------------------------------------------------------------------------------------------------- */
+/* ---- PreparedSteps ------------------------------------------------------------------------------------------------------ */
 
-static PyObject *filter_step(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
+/* Systems and their inputs, checked and held once, so that a tick has one array to look at. */
+typedef struct {
+    PyObject_HEAD
+    Array arrays[2]; /* system, inputs */
+    int n_held;
+    PyTypeObject *kind; /* of these arrays: others, whose numbers may not be what they say, are not taken */
+    Py_ssize_t n_states, n_outputs, stride, n_steps, n_bytes;
+} PreparedSteps;
+
+static int hold(PreparedSteps *self, PyObject *const *arguments, Py_ssize_t n_outputs)
 {
-    static const Spec specs[] = {
-        {"system", 0, 2, 0}, {"inputs", 0, 3, 0}, {"observation", 0, 1, 0}, {"before", 0, 2, 0}, {"after", 1, 2, 0},
-    };
-    enum { COUNT = sizeof(specs) / sizeof(specs[0]) };
-    Array x[COUNT];
-    if (given != COUNT + 1) {
-        PyErr_Format(PyExc_TypeError, "expected %d arrays and a number, got %zd arguments", COUNT, given);
+    static const Spec specs[] = {{"system", 0, 2, 0}, {"inputs", 0, 3, 0}};
+    if (take(arguments, 2, specs, 2, self->arrays) < 0) return -1;
+    self->n_held = 2;
+    const Py_ssize_t *shape = self->arrays[1].view.shape, n = shape[1] - 1, stride = shape[2];
+    if (!few_states(n) || !agree(&self->arrays[0], "system", n * n + 2 * n + 1, stride, 0, 0)) return -1;
+    if (stride % WIDTH || n_outputs < 1 || n_outputs > stride || n_outputs <= stride - WIDTH) {
+        PyErr_Format(PyExc_ValueError, "expected rows padded from %zd to a multiple of %d, got %zd", n_outputs, WIDTH, stride);
+        return -1;
+    }
+    self->kind = (PyTypeObject *)Py_NewRef((PyObject *)Py_TYPE(arguments[0]));
+    self->n_states = n;
+    self->n_outputs = n_outputs;
+    self->stride = stride;
+    self->n_steps = shape[0];
+    self->n_bytes = (n * n + n + 3) * stride * (Py_ssize_t)sizeof(double);
+    return 0;
+}
+
+static PyObject *prepare_steps(PyTypeObject *type, PyObject *arguments, PyObject *named)
+{
+    PyObject *arrays[2];
+    Py_ssize_t n_outputs;
+    if (named != NULL && PyDict_Size(named)) {
+        PyErr_SetString(PyExc_TypeError, "expected arguments without names");
         return NULL;
     }
-    const Py_ssize_t step = PyLong_AsSsize_t(arguments[COUNT]);
-    if (step == -1 && PyErr_Occurred()) return NULL;
-    if (take(arguments, COUNT, specs, COUNT, x) < 0) return NULL;
-    const Py_ssize_t d = x[2].view.shape[0], stride = x[4].view.shape[1], steps = x[1].view.shape[0];
-    const Py_ssize_t n = x[1].view.shape[1] - 1;
-    Py_ssize_t n_seen = 0;
-    int fits = few_states(n) && agree(&x[0], "system", n * n + 2 * n + 1, stride, 0, 0)
-               && agree(&x[1], "inputs", steps, n + 1, stride, 0) && agree(&x[3], "before", n * n + n + 4, stride, 0, 0)
-               && agree(&x[4], "after", n * n + n + 4, stride, 0, 0);
-    if (fits && (stride % WIDTH || d > stride || d <= stride - WIDTH)) {
-        PyErr_Format(PyExc_ValueError, "expected rows padded from %zd to a multiple of %d, got %zd", d, WIDTH, stride);
-        fits = 0;
+    if (!PyArg_ParseTuple(arguments, "OOn", &arrays[0], &arrays[1], &n_outputs)) return NULL;
+    PreparedSteps *self = (PreparedSteps *)PyType_GenericAlloc(type, 0);
+    if (self != NULL && hold(self, arrays, n_outputs) < 0) {
+        Py_DECREF(self);
+        return NULL;
     }
-    if (fits && (step < 0 || step >= steps)) {
-        PyErr_Format(PyExc_ValueError, "expected a step of %zd, got %zd", steps, step);
-        fits = 0;
-    }
-    if (fits) {
-        const double *now = x[1].data + step * (n + 1) * stride;
-        n_seen = CHOOSE(step_all)((int)n, d, stride, x[0].data, now, x[2].data, x[3].data, x[4].data);
-    }
-    release(x, COUNT);
-    return fits ? PyLong_FromSsize_t(n_seen) : NULL;
+    return (PyObject *)self;
 }
+
+static void forget_steps(PyObject *object)
+{
+    PreparedSteps *self = (PreparedSteps *)object;
+    PyTypeObject *type = Py_TYPE(object);
+    release(self->arrays, self->n_held);
+    Py_XDECREF((PyObject *)self->kind);
+    PyObject_Free(object);
+    Py_DECREF((PyObject *)type);
+}
+
+/* (n_seen, n_outputs, log-likelihood, record); takes over the record. */
+static PyObject *told_of_step(const PreparedSteps *self, Py_ssize_t n_seen, double log_likelihood, PyObject *record)
+{
+    PyObject *told = PyTuple_New(4), *parts[4];
+    parts[0] = PyLong_FromSsize_t(n_seen);
+    parts[1] = PyLong_FromSsize_t(self->n_outputs);
+    parts[2] = PyFloat_FromDouble(log_likelihood);
+    parts[3] = record;
+    int has_memory = told != NULL;
+    for (int i = 0; i < 4; i++) {
+        has_memory = has_memory && parts[i] != NULL;
+        if (told != NULL)
+            PyTuple_SetItem(told, i, parts[i]);
+        else
+            Py_XDECREF(parts[i]);
+    }
+    if (has_memory) return told;
+    Py_XDECREF(told);
+    return NULL;
+}
+
+static PyObject *take_step(PyObject *object, PyObject *const *arguments, Py_ssize_t given)
+{
+    const PreparedSteps *self = (PreparedSteps *)object;
+    if (given != 3) {
+        PyErr_Format(PyExc_TypeError, "expected an observation, a record and a step, got %zd arguments", given);
+        return NULL;
+    }
+    const Py_ssize_t step = PyLong_AsSsize_t(arguments[2]), n = self->n_states;
+    if (step == -1 && PyErr_Occurred()) return NULL;
+    if (step < 0 || step >= self->n_steps) {
+        PyErr_Format(PyExc_ValueError, "expected a step of %zd, got %zd", self->n_steps, step);
+        return NULL;
+    }
+    if (!PyBytes_Check(arguments[1]) || PyBytes_Size(arguments[1]) != self->n_bytes) {
+        PyErr_Format(PyExc_ValueError, "before: expected a record of %zd bytes", self->n_bytes);
+        return NULL;
+    }
+    Py_buffer view;
+    if (Py_TYPE(arguments[0]) != self->kind) Py_RETURN_NONE;
+    if (PyObject_GetBuffer(arguments[0], &view, PyBUF_C_CONTIGUOUS | PyBUF_FORMAT) < 0) {
+        PyErr_Clear();
+        Py_RETURN_NONE;
+    }
+    PyObject *record = NULL;
+    Py_ssize_t n_seen = -1;
+    double log_likelihood = 0;
+    const int fits = view.ndim == 1 && view.shape[0] == self->n_outputs && view.format && !strcmp(view.format, "d");
+    if (fits && (record = PyBytes_FromStringAndSize(NULL, self->n_bytes)) != NULL) {
+        const double *now = self->arrays[1].data + step * (n + 1) * self->stride;
+        n_seen = CHOOSE(step_all)((int)n, self->n_outputs, self->stride, self->arrays[0].data, now, view.buf,
+                                  (const double *)PyBytes_AsString(arguments[1]), (double *)PyBytes_AsString(record),
+                                  &log_likelihood);
+    }
+    PyBuffer_Release(&view);
+    if (fits && record == NULL) return NULL;
+    if (n_seen >= 0) return told_of_step(self, n_seen, log_likelihood, record);
+    Py_XDECREF(record);
+    Py_RETURN_NONE;
+}
+
+static PyMethodDef step_methods[] = {
+    {"take", (PyCFunction)(void (*)(void))take_step, METH_FASTCALL, NULL},
+    {NULL, NULL, 0, NULL},
+};
+
+static PyType_Slot step_slots[] = {
+    {Py_tp_new, (void *)prepare_steps}, {Py_tp_dealloc, (void *)forget_steps}, {Py_tp_methods, step_methods}, {0, NULL},
+};
+
+static PyType_Spec step_spec = {"probdmp.gaussian._kernels.PreparedSteps", sizeof(PreparedSteps), 0, Py_TPFLAGS_DEFAULT, step_slots};
 
 /* ---- Series that share their gains -------------------------------------------------------------------------------------- */
 
@@ -568,12 +660,19 @@ static PyObject *points_on_lines(PyObject *module, PyObject *const *arguments, P
 #define FUNCTION(name) {#name, (PyCFunction)(void (*)(void))name, METH_FASTCALL, NULL}
 
 static PyMethodDef functions[] = {
-    FUNCTION(filter_systems), FUNCTION(filter_step), FUNCTION(squared_innovations), FUNCTION(smoothed_states),
-    FUNCTION(least_squares), FUNCTION(window_mixtures), FUNCTION(window_evidence), FUNCTION(plain_recordings), FUNCTION(points_on_lines),
+    FUNCTION(filter_systems), FUNCTION(squared_innovations), FUNCTION(smoothed_states), FUNCTION(least_squares), FUNCTION(window_mixtures), FUNCTION(window_evidence), FUNCTION(plain_recordings), FUNCTION(points_on_lines),
     {NULL, NULL, 0, NULL},
 };
 
-static PyModuleDef_Slot slots[] = {{0, NULL}};
+static int add_types(PyObject *module)
+{
+    PyObject *type = PyType_FromSpec(&step_spec);
+    const int added = type == NULL ? -1 : PyModule_AddObjectRef(module, "PreparedSteps", type);
+    Py_XDECREF(type);
+    return added;
+}
+
+static PyModuleDef_Slot slots[] = {{Py_mod_exec, (void *)add_types}, {0, NULL}};
 
 static struct PyModuleDef definition = {
     PyModuleDef_HEAD_INIT, "_kernels", "The loops of probdmp.gaussian, compiled; see _kernels_numpy.py.", 0, functions, slots,
@@ -781,10 +880,10 @@ INLINE Lane where_above(Lane x, double floor)
     return load(numbers);
 }
 
-/* ---- filter_step -------------------------------------------------------------------------------------------------------- */
+/* ---- PreparedSteps ------------------------------------------------------------------------------------------------------ */
 
 /* WIDTH degrees of freedom at once; each number of theirs is in a row of its own, `stride` long. Rows of `system` are A, b, c, r; of
-   `inputs` the drift and u; of a record m and V of the next tick, then e, S and the log-likelihood of this one, and its sum. */
+   `inputs` the drift and u; of a record m and V of the next tick, then e, S and the log-likelihood of this one. */
 INLINE void step_lane(int n, Py_ssize_t stride, const double *system, const double *inputs, Lane observed, const double *before,
                       double *after)
 {
@@ -807,9 +906,10 @@ INLINE void step_lane(int n, Py_ssize_t stride, const double *system, const doub
         e = plus_product(e, times(-1.0, c[i]), m[i]);
         s = plus_product(s, c[i], spread[i]);
     }
+    const Lane seen = where_seen(e, e), nats = plus_number(plus_product(logarithm(s), e, quotient(e, s)), LOG_2PI);
     store(after + (n + n * n) * stride, e);
     store(after + (n + n * n + 1) * stride, s);
-    const Lane seen = where_seen(e, e);
+    store(after + (n + n * n + 2) * stride, where_seen(times(-0.5, nats), e));
     UNROLL for (int i = 0; i < n; i++) {
         gain[i] = where_seen(quotient(spread[i], s), e);
         m[i] = plus_product(m[i], gain[i], seen);
@@ -849,10 +949,9 @@ INLINE void step_lane(int n, Py_ssize_t stride, const double *system, const doub
 
 /* How many were observed; -1 if one cannot be squared. The rows are padded to a multiple of WIDTH. */
 static Py_ssize_t step_all(int n, Py_ssize_t n_dof, Py_ssize_t stride, const double *system, const double *inputs,
-                           const double *observed, const double *before, double *after)
+                           const double *observed, const double *before, double *after, double *log_likelihood)
 {
-    const double *e = after + (n + n * n) * stride, *s = e + stride;
-    double *log_likelihood = after + (n + n * n + 2) * stride;
+    const double *shares = after + (n + n * n + 2) * stride;
     Py_ssize_t n_seen = 0;
     for (Py_ssize_t d = 0; d < n_dof; d++) {
         if (fabs(observed[d]) > LARGEST_MAGNITUDE) return -1;
@@ -866,12 +965,7 @@ static Py_ssize_t step_all(int n, Py_ssize_t n_dof, Py_ssize_t stride, const dou
         WITH_STATES(n, BODY)
 #undef BODY
     }
-    double total = 0;
-    for (Py_ssize_t d = 0; d < stride; d++) {
-        log_likelihood[d] = isnan(e[d]) || d >= n_dof ? 0 : -0.5 * (e[d] * e[d] / s[d] + log(s[d]) + LOG_2PI);
-        total += log_likelihood[d];
-    }
-    for (Py_ssize_t d = 0; d < stride; d++) log_likelihood[stride + d] = total;
+    for (Py_ssize_t d = 0; d < n_dof; d++) *log_likelihood += shares[d];
     return n_seen;
 }
 

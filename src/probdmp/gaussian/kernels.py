@@ -15,7 +15,7 @@ __all__ = [
     "COMPILED",
     "LANE",
     "MOST_STATES",
-    "filter_step",
+    "PreparedSteps",
     "filter_systems",
     "in_threads",
     "least_squares",
@@ -47,12 +47,12 @@ _kernels = _chosen()
 COMPILED = _kernels is not _kernels_numpy
 """Whether the compiled kernels are in use."""
 LANE = 8
-"""Systems that `filter_step` filters at once: its rows are padded to a multiple of it."""
+"""Systems that `PreparedSteps` filters at once: its rows are padded to a multiple of it."""
 MOST_STATES = 4
 """States of a system that the kernels can filter."""
 
 filter_systems: Callable[..., None] = _kernels.filter_systems
-filter_step: Callable[..., int] = _kernels.filter_step
+PreparedSteps: type[_kernels_numpy.PreparedSteps] = _kernels.PreparedSteps
 squared_innovations: Callable[..., None] = _kernels.squared_innovations
 smoothed_states: Callable[..., None] = _kernels.smoothed_states
 least_squares: Callable[..., None] = _kernels.least_squares
