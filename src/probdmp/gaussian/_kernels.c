@@ -162,6 +162,13 @@ typedef struct {
     double *packed, *window, *sums, *own;
 } Windows;
 
+/* Outputs of maps of one window, under some accounts of it. */
+typedef struct {
+    Py_ssize_t n_outputs, n_inputs, n_accounts, n_sums;
+    const double *maps, *window;
+    const int64_t *which, *reach, *ends;
+} OneWindow;
+
 /* Recordings (N, T, S), and points between their samples: (before - after) beyond + after, less the start, in ranges. */
 typedef struct {
     Py_ssize_t n, n_times, n_signals, n_points;
@@ -209,6 +216,9 @@ typedef struct {
 #define weigh_lane NAMED(weigh_lane)
 #define look_at_windows NAMED(look_at_windows)
 
+#define scalar_product NAMED(scalar_product)
+#define square_window NAMED(square_window)
+
 #define look_for_odd NAMED(look_for_odd)
 #define draw_lines NAMED(draw_lines)
 
@@ -232,6 +242,7 @@ static void look_at_processor(void) {}
 #endif
 #undef filter_all
 #undef look_at_windows
+#undef square_window
 #undef look_for_odd
 #undef draw_lines
 #undef step_all
@@ -606,6 +617,33 @@ static PyObject *window_evidence(PyObject *module, PyObject *const *arguments, P
     Py_RETURN_NONE;
 }
 
+/* ---- One window --------------------------------------------------------------------------------------------------------- */
+
+static PyObject *window_sums(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
+{
+    static const Spec specs[] = {{"maps", 0, 3, 0}, {"which", 0, 1, 1}, {"reach", 0, 1, 1}, {"window", 0, 1, 0},
+                                 {"ends", 0, 1, 1}, {"sums", 1, 2, 0}};
+    enum { COUNT = sizeof(specs) / sizeof(specs[0]) };
+    Array x[COUNT];
+    if (take(arguments, given, specs, COUNT, x) < 0) return NULL;
+    const OneWindow s = {
+        .n_outputs = x[0].view.shape[1], .n_inputs = x[0].view.shape[2], .n_accounts = x[1].view.shape[0],
+        .n_sums = x[4].view.shape[0] - 1, .maps = x[0].data, .which = x[1].integers, .reach = x[2].integers,
+        .window = x[3].data, .ends = x[4].integers,
+    };
+    const int fits = agree(&x[2], "reach", s.n_outputs, 0, 0, 0) && agree(&x[5], "sums", s.n_sums, s.n_accounts, 0, 0);
+    int is_sound = fits && x[3].view.shape[0] <= s.n_inputs && s.ends[0] >= 0 && s.ends[s.n_sums] <= s.n_outputs;
+    for (Py_ssize_t a = 0; is_sound && a < s.n_accounts; a++) is_sound = s.which[a] >= 0 && s.which[a] < x[0].view.shape[0];
+    for (Py_ssize_t j = 0; is_sound && j < s.n_sums; j++) is_sound = s.ends[j] < s.ends[j + 1];
+    for (Py_ssize_t i = is_sound ? s.ends[0] : 0; is_sound && i < s.ends[s.n_sums]; i++)
+        is_sound = s.reach[i] >= 0 && s.reach[i] <= x[3].view.shape[0];
+    if (is_sound) CHOOSE(square_window)(&s, x[5].data);
+    release(x, COUNT);
+    if (is_sound) Py_RETURN_NONE;
+    if (fits) PyErr_SetString(PyExc_ValueError, "maps, which, reach, window and ends do not belong together");
+    return NULL;
+}
+
 /* ---- Recordings --------------------------------------------------------------------------------------------------------- */
 
 static PyObject *plain_recordings(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
@@ -660,7 +698,8 @@ static PyObject *points_on_lines(PyObject *module, PyObject *const *arguments, P
 #define FUNCTION(name) {#name, (PyCFunction)(void (*)(void))name, METH_FASTCALL, NULL}
 
 static PyMethodDef functions[] = {
-    FUNCTION(filter_systems), FUNCTION(squared_innovations), FUNCTION(smoothed_states), FUNCTION(least_squares), FUNCTION(window_mixtures), FUNCTION(window_evidence), FUNCTION(plain_recordings), FUNCTION(points_on_lines),
+    FUNCTION(filter_systems), FUNCTION(squared_innovations), FUNCTION(smoothed_states), FUNCTION(least_squares),
+    FUNCTION(window_mixtures), FUNCTION(window_evidence), FUNCTION(window_sums), FUNCTION(plain_recordings), FUNCTION(points_on_lines),
     {NULL, NULL, 0, NULL},
 };
 
@@ -1315,6 +1354,36 @@ static void look_at_windows(const Windows *s, double *found)
                 weigh_lane(s, place, mapped, first, width, found);
             else
                 look_at_lane(s, place, mapped, first, width, found);
+        }
+    }
+}
+
+/* ---- One window --------------------------------------------------------------------------------------------------------- */
+
+INLINE double scalar_product(const double *x, const double *y, Py_ssize_t n)
+{
+    double numbers[WIDTH] = {0}, product = 0;
+    Lane sum = load(numbers);
+    Py_ssize_t i = 0;
+    for (; i + WIDTH <= n; i += WIDTH) sum = plus_product(sum, load(x + i), load(y + i));
+    store(numbers, sum);
+    for (int w = 0; w < WIDTH; w++) product += numbers[w];
+    for (; i < n; i++) product += x[i] * y[i];
+    return product;
+}
+
+/* Sums (J, A) of the squares of the outputs from each end to the next; each depends on as many inputs as it reaches. */
+static void square_window(const OneWindow *s, double *sums)
+{
+    for (Py_ssize_t a = 0; a < s->n_accounts; a++) {
+        const double *map = s->maps + s->which[a] * s->n_outputs * s->n_inputs;
+        for (Py_ssize_t j = 0; j < s->n_sums; j++) {
+            double sum = 0;
+            for (Py_ssize_t i = s->ends[j]; i < s->ends[j + 1]; i++) {
+                const double output = scalar_product(map + i * s->n_inputs, s->window, s->reach[i]);
+                sum += output * output;
+            }
+            sums[j * s->n_accounts + a] = sum;
         }
     }
 }

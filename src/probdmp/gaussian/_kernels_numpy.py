@@ -15,6 +15,7 @@ from probdmp.gaussian._recordings_numpy import (
     split_sums,
     window_evidence,
     window_mixtures,
+    window_sums,
 )
 
 __all__ = [
@@ -28,6 +29,7 @@ __all__ = [
     "squared_innovations",
     "window_evidence",
     "window_mixtures",
+    "window_sums",
 ]
 
 LOG_2PI = float(np.log(2 * np.pi))

@@ -26,6 +26,7 @@ __all__ = [
     "squared_innovations",
     "window_evidence",
     "window_mixtures",
+    "window_sums",
 ]
 
 
@@ -58,6 +59,7 @@ smoothed_states: Callable[..., None] = _kernels.smoothed_states
 least_squares: Callable[..., None] = _kernels.least_squares
 window_mixtures: Callable[..., None] = _kernels.window_mixtures
 window_evidence: Callable[..., None] = _kernels.window_evidence
+window_sums: Callable[..., None] = _kernels.window_sums
 plain_recordings: Callable[..., None] = _kernels.plain_recordings
 points_on_lines: Callable[..., None] = _kernels.points_on_lines
 split_sums = _kernels_numpy.split_sums
