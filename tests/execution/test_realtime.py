@@ -102,6 +102,16 @@ def test_the_buffer_of_a_reading_may_be_used_again(learned, letters):
             np.testing.assert_equal(one.test_ratio, other.test_ratio)
 
 
+def test_what_is_masked_was_not_measured(learned):
+    readings = readings_of(learned, 0.01)
+    masked, missing = learned.execute(dt=0.01), learned.execute(dt=0.01)
+    for t, reading in enumerate(readings[:20]):
+        gone = reading.copy()
+        gone[1] = np.nan if t % 3 else gone[1]
+        one = masked.step(np.ma.masked_array(reading, [False, bool(t % 3)]))
+        np.testing.assert_array_equal(one.position, missing.step(gone).position)
+
+
 @pytest.mark.parametrize("value", [np.inf, -np.inf, 1e150])
 def test_a_refused_reading_changes_nothing(learned, value):
     readings = readings_of(learned, 0.01)
@@ -137,14 +147,16 @@ def test_ten_million_ticks_leave_a_covariance_a_covariance():
     system[:9], system[9:12], system[14] = a.ravel()[:, None], np.array([[1.0], [dt], [dt**2]]), 1.0
     system[15] = np.repeat([1e-12, 1e-2, 1e-12, 1e-2], 2)
     inputs[3] = np.repeat([1e-8, 1e-8, 1.0, 1.0], 2) * 156.25**2
-    records, rng = np.zeros((2, n + n * n + 4, width)), np.random.default_rng(0)
+    prepared, rng = kernels.PreparedSteps(system, inputs[None], width), np.random.default_rng(0)
+    record = bytes(8 * width * (n + n * n + 3))
     readings = np.where(rng.random((1000, width)) < 0.1, np.nan, 1e-3 * rng.standard_normal((1000, width)))
     for _ in range(10_000):
-        for i, reading in enumerate(readings):
-            kernels.filter_step(system, inputs[None], reading, records[i % 2], records[1 - i % 2], 0)
-        covariances = records[0, n : n + n * n].T.reshape(width, n, n)
+        for reading in readings:
+            record = prepared.take(reading, record, 0)[3]
+        rows = np.frombuffer(record).reshape(-1, width)
+        covariances = rows[n : n + n * n].T.reshape(width, n, n)
         assert np.array_equal(covariances, covariances.mT)
         stds = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
         scaled = covariances / (stds[:, :, None] * stds[:, None, :])
         assert np.linalg.eigvalsh(scaled).min() > -1e-12
-    assert np.all(np.isfinite(records[0, : n + n * n]))
+    assert np.all(np.isfinite(rows[: n + n * n]))

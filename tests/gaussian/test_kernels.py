@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -119,13 +120,13 @@ def test_shortest_and_longest_are_filtered_alike(n_steps):
 
 @st.composite
 def ticks(draw):
-    """System, inputs, observation and record of D degrees of freedom, as `filter_step` takes them."""
+    """System, inputs, observation and record of D degrees of freedom, as `PreparedSteps` takes them."""
     rng = np.random.default_rng(draw(seeds))
     d, n = draw(st.integers(1, 30)), draw(st.integers(1, kernels.MOST_STATES))
     width = -(-d // kernels.LANE) * kernels.LANE
     system, inputs = rng.normal(size=(n * n + 2 * n + 1, width)), rng.normal(size=(n + 1, width))
     system[-1], inputs[-1] = draw(magnitudes) * (1 + rng.random(width)), draw(magnitudes) * rng.random(width)
-    before = rng.normal(size=(n + n * n + 4, width))
+    before = rng.normal(size=(n + n * n + 3, width))
     root = rng.normal(size=(width, n, n))
     before[n : n + n * n] = (root @ root.mT).reshape(width, -1).T
     observation = rng.normal(size=d)
@@ -136,25 +137,74 @@ def ticks(draw):
 @needs_extension
 @given(ticks())
 def test_a_tick_is_the_same(arguments):
-    after, expected = np.empty((2, *arguments[-1].shape))
-    seen = _compiled().filter_step(*arguments, after, 0)
-    assert seen == _kernels_numpy.filter_step(*arguments, expected, 0) == int(np.sum(~np.isnan(arguments[2])))
-    d = len(arguments[2])
-    for ours, plain in zip(after[:, :d], expected[:, :d], strict=True):
+    system, inputs, observation, before = arguments
+    d = len(observation)
+    (*told, likelihood, after), (*expected, likelihood_expected, after_expected) = (
+        module.PreparedSteps(system, inputs, d).take(observation, before.tobytes(), 0)
+        for module in (_compiled(), _kernels_numpy)
+    )
+    assert told == expected == [int(np.sum(~np.isnan(observation))), d]
+    assert_same(np.array(likelihood), np.array(likelihood_expected))
+    records = [np.frombuffer(record).reshape(before.shape)[:, :d] for record in (after, after_expected)]
+    for ours, plain in zip(*records, strict=True):
         assert_same(ours, plain)
 
 
 @pytest.mark.parametrize("module", ["compiled", "plain"])
-@pytest.mark.parametrize("value", [np.inf, -np.inf, 1e101])
-def test_what_cannot_be_squared_is_refused_before_anything_is_written(module, value):
+@pytest.mark.parametrize(
+    "given",
+    [
+        *(np.array([0.0, value]) for value in (np.inf, -np.inf, 1e101)),
+        np.zeros(3),
+        np.zeros((2, 1)),
+        np.zeros(2, dtype=np.float32),
+        np.zeros(2, dtype=">f8"),
+        np.zeros(2, dtype="datetime64[s]"),
+        np.zeros(4)[::2],
+        np.ma.masked_array([0.0, 1.0], [True, False]),
+        [0.0, 0.0],
+        b"0123456789abcdef",
+        None,
+    ],
+)
+def test_what_is_no_observation_is_not_taken(module, given):
     if module == "compiled" and not kernels.COMPILED:
         pytest.skip("probdmp.gaussian._kernels was not built, or is not wanted")
     chosen = _compiled() if module == "compiled" else _kernels_numpy
     n, width = 3, kernels.LANE
-    after = np.full((n + n * n + 4, width), -7.0)
+    prepared = chosen.PreparedSteps(np.ones((n * n + 2 * n + 1, width)), np.ones((2, n + 1, width)), 2)
+    record = np.ones((n + n * n + 3, width)).tobytes()
+    assert prepared.take(given, record, 1) is None
+    assert prepared.take(np.zeros(2), record, 1) is not None
+
+
+@needs_extension
+def test_steps_that_were_not_prepared_are_refused():
+    n, width = 3, kernels.LANE
     system, inputs = np.ones((n * n + 2 * n + 1, width)), np.ones((2, n + 1, width))
-    assert chosen.filter_step(system, inputs, np.array([0.0, value]), np.ones_like(after), after, 1) == -1
-    assert np.all(after == -7.0)
+    record, reading = np.ones((n + n * n + 3, width)).tobytes(), np.zeros(2)
+    made = _compiled().PreparedSteps
+    for arguments in (
+        (system, inputs, 0),
+        (system, inputs, 9),
+        (system[1:], inputs, 2),
+        (inputs, system, 2),
+        (system[:, :7], inputs, 2),
+    ):
+        with pytest.raises(ValueError, match=r"expected|contiguous"):
+            made(*arguments)
+    for arguments in ((), (system, inputs), (system, None, 2), (system, inputs, 2.5)):
+        with pytest.raises(TypeError):
+            made(*arguments)
+    with pytest.raises(TypeError, match="without names"):
+        made(system, inputs, 2, n=3)
+    prepared = made(system, inputs, 2)
+    for arguments in ((reading, record, 2), (reading, record, -1), (reading, record[:-8], 0), (reading, bytearray(record), 0)):
+        with pytest.raises(ValueError, match="expected"):
+            prepared.take(*arguments)
+    for arguments in ((), (reading, record), (reading, record, "0")):
+        with pytest.raises(TypeError):
+            prepared.take(*arguments)
 
 
 @st.composite
@@ -342,6 +392,46 @@ def test_ratios_of_mixtures_are_those_of_sums_of_densities_where_they_are_above_
         found, central = np.full(len(expected), -7.0), int(rng.integers(which.shape[1]))
         module.window_ratios(*own, scales, n_halves, *contrary, floors, found, 4.0, central)
         np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-11)
+
+
+@given(windows(), seeds)
+def test_sums_of_one_window_are_those_of_its_outputs(arguments, seed):
+    values, rows, maps, which, ends, reach, _ = arguments
+    ends = np.append(np.random.default_rng(seed).integers(0, ends[0]), ends)
+    window, reached = values[rows[0], 0], int(reach[ends[-1] - 1])
+    squares = (maps[which[0]] @ window) ** 2
+    expected = [squares[:, begin:end].sum(axis=1) for begin, end in pairwise(ends)]
+    for module in {_kernels_numpy, _compiled() if kernels.COMPILED else _kernels_numpy}:
+        sums = np.full((len(ends) - 1, which.shape[1]), -7.0)
+        module.window_sums(maps, which[0], reach, window[:reached].copy(), ends, sums)
+        assert_same(sums, np.array(expected))
+
+
+@needs_extension
+@pytest.mark.parametrize(
+    ("position", "wrong"),
+    [
+        (1, np.array([0, 2])),
+        (1, np.array([-1, 0])),
+        (2, np.array([1, 3])),
+        (2, np.array([-1, 2])),
+        (2, np.array([1, 2, 2])),
+        (3, np.ones(1)),
+        (3, np.ones(3)),
+        (4, np.array([0, 3])),
+        (4, np.array([-1, 2])),
+        (4, np.array([1, 1])),
+        (4, np.zeros(0, dtype=np.int64)),
+        (5, np.zeros((1, 3))),
+        (5, np.zeros((2, 2))),
+    ],
+)
+def test_windows_that_do_not_fit_their_maps_are_refused(position, wrong):
+    arguments = [np.ones((2, 2, 2)), np.array([0, 1]), np.array([1, 2]), np.ones(2), np.array([0, 2]), np.zeros((1, 2))]
+    _compiled().window_sums(*arguments)
+    arguments[position] = wrong
+    with pytest.raises(ValueError, match=r"expected|belong together"):
+        _compiled().window_sums(*arguments)
 
 
 @needs_extension

@@ -64,19 +64,19 @@ class ChannelStatistic:
             self._chosen % n_signals,
             which,
         )
+        self._ends = np.array([0, self._n_movement, len(self._chosen)])
         self.seen_at = self.offsets[self._chosen // n_signals]
         """(E) tick of each of them relative to the one that is judged."""
 
     def weigh(self, inputs: WindowInputs, length: int) -> FloatArray:
         """Squared distance per number at the first ticks, (length, n) array, of executions of which nothing is unseen."""
-        ends = np.array([self._n_movement, len(self._chosen)])
-        penalties = (SHIFTS / SHIFT_STD) ** 2
-        of_movement, of_both = self.maps.squares(inputs, self.seen_at, ends, np.array([length, length]), penalties)
+        penalties, wanted = (SHIFTS / SHIFT_STD) ** 2, np.array([length, length])
+        of_movement, of_both = self.maps.squares(inputs, self.seen_at, self._ends[1:], wanted, penalties)
         return np.asarray((of_both - of_movement) / len(CHANNEL_LAGS))
 
     def look(self, tick: int, window: FloatArray) -> float:
         """The same at one tick, of a window as in `WindowMaps.look`."""
-        of_movement, of_channel = self.maps.look(tick, window, np.array([0, self._n_movement]), len(self._chosen))
+        of_movement, of_channel = self.maps.look(tick, window, self._ends)
         of_movement += (SHIFTS / SHIFT_STD) ** 2
         return float((of_movement + of_channel).min() - of_movement.min()) / len(CHANNEL_LAGS)
 

@@ -101,20 +101,22 @@ class Foreseen:
         bases = np.ascontiguousarray(self._bases[..., points - 1].swapaxes(1, 2))
         return Densities(bases, int(DEGREES_OF_FREEDOM) + points * self._dof, DEGREES_OF_FREEDOM)
 
-    def looks(self, points: IntArray, places: IntArray) -> "Looks":
-        """Ready to be asked about the first points and all points of single executions.
+    def looks(self, before: int, ahead: IntArray, places: IntArray) -> "Looks":
+        """Ready to be asked about single executions.
 
         Parameters
         ----------
-        points : (H, 2) numbers of points of H windows.
+        before : how many of the points come first, in all windows.
+        ahead : (H) how many follow in each of H windows, increasing.
         places : (T, H) where the windows are at each tick.
         """
-        ends, rows = points * self._dof, np.minimum(places, len(self._bases) - 1)[..., None]
+        points = np.stack([np.full_like(ahead, before), before + ahead], axis=1)
+        rows = np.minimum(places, len(self._bases) - 1)[..., None]
         # (T, H, 2, A)
         bases = np.take_along_axis(self._bases[rows[..., 0]].swapaxes(-1, -2), (points - 1)[None, ..., None], axis=2)
-        starts = [np.array([0, first]) for first in ends[:, 0]]
-        powers = (DEGREES_OF_FREEDOM + ends) / 2
-        return Looks(self._windows.maps, places.tolist(), starts, ends[:, 1].tolist(), bases, powers)
+        ends = np.concatenate([[0, before], before + ahead]) * self._dof
+        powers = (DEGREES_OF_FREEDOM + points * self._dof) / 2
+        return Looks(self._windows.maps, places.tolist(), ends, bases, powers)
 
     def log_densities(self, places: IntArray, windows: FloatArray, means: FloatArray) -> FloatArray:
         """Of the points of windows (n, T, P, D) up to each one: (n, T, P) array."""
@@ -125,29 +127,53 @@ class Foreseen:
 
 
 class Looks(NamedTuple):
-    """What is computed before to look at single executions fast: H windows at each of T ticks."""
+    """What is computed before to look at single executions fast: H windows at each of T ticks, each longer than the last."""
 
     maps: WindowMaps
     places: list[list[int]]
-    starts: list[IntArray]
-    ends: list[int]
+    ends: IntArray
+    """(H + 2) outputs: none, those of the points that come first, and of all of each window."""
     bases: FloatArray
     """(T, H, 2, A) array."""
     powers: FloatArray
     """(H, 2) array."""
 
-    def log_densities(self, tick: int, windows: Sequence[FloatArray]) -> FloatArray:
-        """Of the first points and of all, (H, 2) array, of windows as in `WindowMaps.look`."""
-        bases, squares = self.bases[tick], np.empty(self.bases.shape[1:])
-        for h, place in enumerate(self.places[tick]):
-            squares[h] = self.maps.look(place, windows[h], self.starts[h], self.ends[h])
-        squares[:, 1] += squares[:, 0]
+    def log_densities(self, tick: int, windows: Sequence[FloatArray], known: dict[int, FloatArray]) -> FloatArray:
+        """Of the first points and of all, (h, 2) array, of the first h windows as in `WindowMaps.look`.
+
+        Parameters
+        ----------
+        known : of this execution, by place, what the next window there begins with; kept from tick to tick.
+        """
+        count = len(windows)
+        bases, powers = self.bases[tick, :count], self.powers[:count]
+        squares = np.empty(bases.shape)
+        for h, window in enumerate(windows):
+            squares[h] = self._squares(h, self.places[tick][h], window, known)
         squares /= DEGREES_OF_FREEDOM
         squares += 1
         squares *= bases
-        least = squares.min(axis=-1)
-        mixed = ((least[..., None] / squares) ** self.powers[..., None]).sum(axis=-1)
-        return np.asarray(np.log(mixed) - self.powers * np.log(least))
+        least = np.minimum.reduce(squares, axis=-1)
+        np.divide(least[..., None], squares, out=squares)
+        squares **= powers[..., None]
+        return np.asarray(np.log(np.add.reduce(squares, axis=-1)) - powers * np.log(least))
+
+    def _squares(self, h: int, place: int, window: FloatArray, known: dict[int, FloatArray]) -> FloatArray:
+        """Squared distances of the first points and of all of window h, (2, A) array.
+
+        Points that have been looked at in the window before, some ticks ago, are not looked at again.
+        """
+        begun = known.pop(place, None)
+        if begun is None:
+            sums = self.maps.look(place, window, self.ends[: h + 3])
+            begun = sums[:2]
+            for later in (sums[0], *sums[2:]):
+                begun[1] += later
+        else:
+            begun[1] += self.maps.look(place, window, self.ends[h + 1 : h + 3])[0]
+        if h + 1 < len(self.powers):
+            known[place] = begun
+        return begun
 
 
 class Standstill:
@@ -183,34 +209,43 @@ class Standstill:
 
     @cached_property
     def _looks(self) -> Looks:
-        before = len(self.before)
-        points = np.stack([np.full_like(self._points_at, before), before + self._points_at], axis=1)
-        return self._going_on.looks(points, np.maximum(np.arange(self.last + 1)[:, None] - np.array(self.horizons), 0))
+        places = np.maximum(np.arange(self.last + 1)[:, None] - np.array(self.horizons), 0)
+        return self._going_on.looks(len(self.before), self._points_at, places)
 
     @cached_property
-    def _compared(self) -> tuple[IntArray, IntArray, IntArray]:
-        """Where the numbers after each place are in all windows, and those of the place; and where the points begin."""
+    def _compared(self) -> list[tuple[IntArray, IntArray, IntArray]]:
+        """For the first J windows: where the numbers after each place are in all of them, and those of the place; and where the
+        points begin."""
         dof, first = len(self._rest_stds), 1 + len(self._rest_stds)
         sizes = first + (len(self.before) + self._points_at) * dof
         ahead = [np.arange(end - n * dof, end) for end, n in zip(np.cumsum(sizes), self._points_at, strict=True)]
         here = [np.tile(np.arange(rows[0] - dof, rows[0]), len(rows) // dof) for rows in ahead]
-        return np.concatenate(ahead), np.concatenate(here), np.cumsum(self._points_at) - self._points_at
+        starts = np.cumsum(self._points_at) - self._points_at
+        counts = range(1, len(ahead) + 1)
+        return [(np.concatenate(ahead[:j]), np.concatenate(here[:j]), starts[:j]) for j in counts]
 
-    def look(self, tick: int, windows: Sequence[FloatArray]) -> FloatArray:
-        """The same now of one execution, (J,) array; of no meaning where the place would be before the start.
+    def prepare(self) -> None:
+        """Compute now what `look` would when it is first called."""
+        _ = self._looks, self._compared
+
+    def look(self, tick: int, windows: Sequence[FloatArray], known: dict[int, FloatArray]) -> FloatArray:
+        """The same now of one execution, (j,) array, for the first j horizons.
 
         Parameters
         ----------
-        windows : for each horizon as in `WindowMaps.look`.
+        windows : for each of these as in `WindowMaps.look`.
+        known : of this execution; kept from tick to tick.
         """
-        here, together = self._looks.log_densities(tick, windows).T
-        (ahead, place, starts), numbers = self._compared, np.concatenate(windows)
+        count = len(windows)
+        here, together = self._looks.log_densities(tick, windows, known).T
+        (ahead, place, starts), numbers = self._compared[count - 1], np.concatenate(windows)
         moved = (numbers[ahead] - numbers[place]).reshape(-1, len(self._rest_stds))
         moved /= self._rest_stds
         sums = np.add.reduceat(moved, starts)
         moved *= moved
-        distances = (np.add.reduceat(moved, starts) - sums * sums / (self._points_at[:, None] + 1)).sum(axis=1)
-        return np.asarray(self._constants - distances / 2 - (together - here))
+        points = self._points_at[:count, None] + 1
+        distances = (np.add.reduceat(moved, starts) - sums * sums / points).sum(axis=1)
+        return np.asarray(self._constants[:count] - distances / 2 - (together - here))
 
     def _rest_constants(self, points: int) -> float:
         """ln of the density of so many points where it is largest."""
@@ -264,14 +299,20 @@ class Pace:
 
     @cached_property
     def _looks(self) -> tuple[Looks, Looks]:
-        points = np.array([[len(self.before), len(self.before) + len(self.ahead)]])
         places = np.maximum(np.arange(self.last + 1)[:, None] - np.array(self.horizons), 0)
-        return self._slowed.looks(points, places), self._going_on.looks(points, places)
+        ahead = np.array([len(self.ahead)])
+        slowed, going_on = (account.looks(len(self.before), ahead, places) for account in (self._slowed, self._going_on))
+        return slowed, going_on
 
-    def look(self, tick: int, windows: Sequence[FloatArray]) -> FloatArray:
-        """The same now of one execution, (J,) array; arguments as for `Standstill.look`."""
-        slowed, going_on = self._looks
-        return np.asarray(slowed.log_densities(tick, windows)[:, 1] - going_on.log_densities(tick, windows)[:, 1])
+    def prepare(self) -> None:
+        """Compute now what `look` would when it is first called."""
+        _ = self._looks
+
+    def look(self, tick: int, windows: Sequence[FloatArray], known: dict[int, FloatArray]) -> FloatArray:
+        """The same now of one execution, (1,) array; arguments as for `Standstill.look`."""
+        # There is one horizon, so nothing is known from the ticks before, and nothing is kept.
+        slowed, going_on = (looks.log_densities(tick, windows, known) for looks in self._looks)
+        return np.asarray(slowed[:, 1] - going_on[:, 1])
 
     def judge(self, places: IntArray, windows: FloatArray, means: FloatArray) -> FloatArray:
         """ln p(slow since the place) / p(gone on) for every point ahead that windows (n, T, P, D) hold: (n, T, points).

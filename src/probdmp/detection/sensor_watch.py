@@ -74,6 +74,9 @@ class SensorWatch:
         self._believed = (unknown, unknown)
         """The last sample but one, and the last."""
         self._is_calm = False
+        self._causes: IntArray | None = None
+        self._is_stale: BoolArray | None = None
+        """What has been asked since anything was missing, wild or repeated: while nothing is, neither changes."""
         self._suspicious, self._last = unknown, unknown
         self._silent, self._skipped = np.zeros(shape), np.zeros(shape)
         self.repeats, self.spikes = np.zeros(shape), np.zeros(shape)
@@ -81,10 +84,12 @@ class SensorWatch:
     @property
     def causes(self) -> IntArray:
         """(*batch) array: which of `CAUSES` applies."""
-        # If nothing moves at all, whether by exact numbers or not, it is the movement that stands still.
-        is_stuck = np.any(self.repeats > self._most_repeats, axis=-1) & ~self._all_repeat
-        has_spikes = self.spikes.sum(axis=-1) > MOST_SPIKES
-        return np.where(is_stuck, CAUSES.index("stuck"), np.where(has_spikes, CAUSES.index("spikes"), 0))
+        if self._causes is None:
+            # If nothing moves at all, whether by exact numbers or not, it is the movement that stands still.
+            is_stuck = np.any(self.repeats > self._most_repeats, axis=-1) & ~self._all_repeat
+            has_spikes = self.spikes.sum(axis=-1) > MOST_SPIKES
+            self._causes = np.where(is_stuck, CAUSES.index("stuck"), np.where(has_spikes, CAUSES.index("spikes"), 0))
+        return self._causes
 
     @property
     def cause(self) -> str:
@@ -99,7 +104,9 @@ class SensorWatch:
     @property
     def is_stale(self) -> BoolArray:
         """(*batch) array: whether a sensor has been silent for too long."""
-        return np.asarray(self.staleness > 1)
+        if self._is_stale is None:
+            self._is_stale = np.asarray(self.staleness > 1)
+        return self._is_stale
 
     @property
     def shares(self) -> FloatArray:
@@ -126,13 +133,14 @@ class SensorWatch:
         """The sample (*batch, S) without what is suspicious of it, which is NaN instead; units of each signal."""
         older, old = self._believed
         jumps = np.abs(measured - old - (self._skipped + 1) * (old - older))
-        if self._is_calm and np.all(jumps <= self._largest_jumps) and not np.any(measured == self._last):
+        if self._is_calm and (jumps <= self._largest_jumps).all() and not (measured == self._last).any():
             self._believed, self._last = (old, measured), measured
             return measured
         return self._look(measured, jumps)
 
     def _look(self, measured: FloatArray, jumps: FloatArray) -> FloatArray:
         """The same where something may be missing, wild or repeated."""
+        self._causes = self._is_stale = None
         older, old = self._believed
         seen = ~np.isnan(measured)
         self._silent = np.where(seen, 0, self._silent + 1)

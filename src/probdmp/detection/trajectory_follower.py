@@ -12,6 +12,7 @@ import numpy as np
 
 from probdmp.checks import FloatArray, IntArray
 from probdmp.detection.channel_statistics import ChannelStatistic
+from probdmp.detection.evidence import Evidence
 from probdmp.detection.movement_channels import MEMORY, MOVEMENT_CHANNELS, Horizon, as_suspicion
 from probdmp.detection.path_model import PathModel
 from probdmp.detection.trajectory_statistics import SLOPPINESS_DELAY, Displacement, Position, sloppiness
@@ -61,6 +62,7 @@ class TrajectoryFollower:
         self._total, self._count = 0.0, 0.0
         self._n_signals = self.means.shape[1]
         self._gathering = gathering
+        self._known: dict[Evidence, dict[int, FloatArray]] = {h.evidence: {} for h in statistics.horizons}
         self._affine = np.append(1.0, whole.ahead(goal[None])[0])
         self._remembered = np.zeros(len(self._affine) + 2 * MEMORY * self._n_signals)
         self._remembered[: len(self._affine)] = self._affine
@@ -127,10 +129,9 @@ class TrajectoryFollower:
         while first < len(horizons):
             channel, evidence, ticks, _ = horizons[first]
             if ticks <= self._tick <= evidence.last:
-                begin, count = 2 + len(feel) + first, len(evidence.horizons)
-                reached = bisect_right(evidence.horizons, self._tick)
-                found = evidence.look(self._tick, windows[begin : begin + count])
-                values[channel : channel + reached] = found[:reached]
+                begin, reached = 2 + len(feel) + first, bisect_right(evidence.horizons, self._tick)
+                found = evidence.look(self._tick, windows[begin : begin + reached], self._known[evidence])
+                values[channel : channel + reached] = found
             first += len(evidence.horizons)
 
     def _look_at_seen(self, values: FloatArray, windows: list[FloatArray]) -> None:

@@ -168,6 +168,12 @@ class TrajectoryModel:
         """What is expected at ticks (n, P) of executions with goals (n, D), of movement and channels: (n, P, S) array."""
         return self._whole.means_at(ticks, goals)
 
+    def prepare(self) -> None:
+        """Compute now what the first ticks of an execution would otherwise have to wait for."""
+        _ = self._asked
+        for evidence, _ in self._questions:
+            evidence.prepare()
+
     def follow(self, goal: FloatArray) -> "TrajectoryFollower":
         """The same for one execution as it happens."""
         return TrajectoryFollower(*self._asked, self._whole, goal)

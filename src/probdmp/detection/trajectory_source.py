@@ -29,6 +29,8 @@ class TrajectorySource:
 
     def __init__(self, expectation: Expectation, task: Task, dt: float, values: FloatArray | None = None) -> None:
         self._expectation, self._values = expectation, values
+        if values is None:
+            expectation.trajectory.prepare()
         self._watch = InnovationWatch(expectation.array, task, dt)
         self._ticks = ExecutionTicks(expectation.primitive, expectation.profile, task, dt)
         self._follower: TrajectoryFollower | None = None

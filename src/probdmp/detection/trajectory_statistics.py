@@ -47,7 +47,7 @@ class Position:
     offsets = np.zeros(1, dtype=np.int64)
 
     def __init__(self, model: PathModel) -> None:
-        self.windows, self._dof = PathWindows(model, self.offsets, START, TICKS + 1), model.means.shape[1]
+        self.windows, self._ends = PathWindows(model, self.offsets, START, TICKS + 1), np.array([0, model.means.shape[1]])
 
     def weigh(self, inputs: WindowInputs, length: int) -> FloatArray:
         """Squared distance at the first ticks, (length, n) array, of executions of which nothing is unseen."""
@@ -56,7 +56,7 @@ class Position:
 
     def look(self, tick: int, window: FloatArray) -> float:
         """The same at one tick, of a window as in `WindowMaps.look`."""
-        return float(self.windows.maps.look(tick, window, START, len(window) - 1 - self._dof)[0, 0])
+        return float(self.windows.maps.look(tick, window, self._ends)[0, 0])
 
     def judge(self, ticks: IntArray, windows: FloatArray, means: FloatArray) -> FloatArray:
         """Squared distance at the ticks (T,) of windows (n, T, 1, D): (n, T) array."""
@@ -73,6 +73,7 @@ class Displacement:
     def __init__(self, model: PathModel) -> None:
         differences = np.hstack([np.ones((len(LAGS), 1)), -np.eye(len(LAGS))])
         self._dof = model.means.shape[1]
+        self._ends = np.array([0, len(LAGS) * self._dof])
         n_places = TICKS + LAGS.max() + DISPLACEMENT_SHIFTS.max() + 1
         self.windows = PathWindows(model, self.offsets, DISPLACEMENT_SHIFTS, n_places, differences)
 
@@ -84,7 +85,7 @@ class Displacement:
 
     def look(self, tick: int, window: FloatArray) -> float:
         """The same at one tick, of a window as in `WindowMaps.look`."""
-        squares = self.windows.maps.look(tick, window, START, len(LAGS) * self._dof)[0]
+        squares = self.windows.maps.look(tick, window, self._ends)[0]
         squares += self.penalties
         return float(squares.min()) / self._dof
 

@@ -5,7 +5,6 @@ That is linear in (1, ahead, window), so one matrix for each place holds all of 
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -62,23 +61,16 @@ class WindowMaps:
     reach: IntArray
     """(R) how many inputs, the first ones, an output and those before it depend on."""
 
-    @cached_property
-    def at_places(self) -> FloatArray:
-        """(T, R, A, 1 + D + E) array: the same ready to be multiplied with single windows."""
-        return self.maps[self.which[:, None], np.arange(self.maps.shape[1])[:, None]]
-
-    def look(self, place: int, window: FloatArray, starts: IntArray, end: int) -> FloatArray:
-        """Squared lengths of the outputs from each of J starts to the next, or the end, of one window: (J, A) array.
+    def look(self, place: int, window: FloatArray, ends: IntArray) -> FloatArray:
+        """Squared lengths of the outputs from each of J + 1 ends to the next, of one window: (J, A) array.
 
         Parameters
         ----------
         window : one, goals ahead, and as many numbers as the outputs depend on.
         """
-        n_places, n_outputs, n_accounts, n_inputs = self.at_places.shape
-        flat = self.at_places.reshape(n_places, n_outputs * n_accounts, n_inputs)
-        white = flat[min(place, n_places - 1), : end * n_accounts, : len(window)].dot(window)
-        white *= white
-        return np.asarray(np.add.reduceat(white.reshape(end, n_accounts), starts))
+        sums = np.empty((len(ends) - 1, self.which.shape[1]))
+        kernels.window_sums(self.maps, self.which[min(place, len(self.which) - 1)], self.reach, window, ends, sums)
+        return sums
 
     def squares(
         self, inputs: WindowInputs, offsets: IntArray, ends: IntArray, wanted: IntArray, penalties: FloatArray

@@ -8,13 +8,14 @@ from numpy.typing import NDArray
 
 from probdmp.checks import BoolArray, FloatArray
 from probdmp.dmp import Primitive
+from probdmp.dmp.phase import phase_at
 from probdmp.dmp.transformation_system import ACCELERATION, POSITION, VELOCITY
 from probdmp.execution.sensed_ticks import SensedTick
 from probdmp.execution.sensor_array import SensorArray
 from probdmp.execution.sensor_reports import SensorTrack, sensor_tracks
 from probdmp.execution.trajectory import GaussianChannel, channels_of
 
-__all__ = ["ExecutionStep", "Judgement"]
+__all__ = ["ExecutionStep", "Judgement", "Plan"]
 
 Array = TypeVar("Array", bound=NDArray[Any])
 
@@ -34,13 +35,23 @@ class Judgement(Protocol):
     def contributions(self) -> FloatArray: ...
 
 
+class Plan(NamedTuple):
+    """What all ticks of an execution have in common."""
+
+    primitive: Primitive
+    array: SensorArray
+    """The sensors."""
+    duration: float
+    """Seconds."""
+    dt: float
+    """Seconds."""
+
+
 class ExecutionStep(NamedTuple):
     """What the controller is to reach at the next tick, and what this tick has shown; arrays are read-only."""
 
-    time: float
-    """Seconds since the start at which the desired state is due."""
-    phase: float
-    """x of the observation."""
+    step: int
+    """Ticks since the start, of the observation."""
     test_ratio: float
     """Statistic over threshold of the detector, above 1 for an alarm; NaN without a detector."""
     verdict: Judgement | None
@@ -51,9 +62,8 @@ class ExecutionStep(NamedTuple):
     """What the filter of the sensors that modulate the command has found: mostly the same."""
     held: FloatArray | None
     """(D, 3) array: what is commanded instead after an alarm with `on_alarm="hold"`."""
-    primitive: Primitive
-    array: SensorArray
-    """The sensors."""
+    plan: Plan
+    """What was to be executed."""
 
     def __repr__(self) -> str:
         due = ", ".join(f"{name} {value:.4g}" for name, value in zip(self.primitive.names, self.position, strict=True))
@@ -61,6 +71,26 @@ class ExecutionStep(NamedTuple):
         failed = "; failed" if self.verdict is not None and self.verdict.failed else ""
         held = "; held" if self.held is not None else ""
         return f"<ExecutionStep due at {self.time:.3f} s: {due}{ratio}{failed}{held}>"
+
+    @property
+    def time(self) -> float:
+        """Seconds since the start at which the desired state is due."""
+        return (self.step + 1) * self.plan.dt
+
+    @property
+    def phase(self) -> float:
+        """x of the observation."""
+        return phase_at(self.step * self.plan.dt, self.plan.duration)
+
+    @property
+    def primitive(self) -> Primitive:
+        """What is executed."""
+        return self.plan.primitive
+
+    @property
+    def array(self) -> SensorArray:
+        """The sensors."""
+        return self.plan.array
 
     @property
     def position(self) -> FloatArray:

@@ -12,16 +12,16 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from probdmp.checks import FloatArray, check_choice, check_number, check_seconds, is_plain
+from probdmp.checks import FloatArray, check_choice, check_number, check_seconds
 from probdmp.dmp import Primitive, Task, step_count
 from probdmp.dmp.phase import phase_at
 from probdmp.dmp.transformation_system import POSITION
-from probdmp.execution.execution_step import ExecutionStep, Judgement
+from probdmp.execution.execution_step import ExecutionStep, Judgement, Plan
 from probdmp.execution.readings import observation_of
 from probdmp.execution.sensed_ticks import SensedTick
 from probdmp.execution.sensor_array import SensorArray
 from probdmp.execution.sensor_reports import SensorCounts
-from probdmp.execution.step_filters import step_filter
+from probdmp.execution.step_filters import PlainFilter, step_filter
 
 __all__ = ["Monitor", "Observed", "OnlineExecution"]
 
@@ -105,8 +105,9 @@ class OnlineExecution:
             self._modulating = None
         self._detector = detector
         self._on_alarm = check_choice(on_alarm, "on_alarm", ALARM_REACTIONS)
-        self._duration, self._n_outputs = float(task.duration), len(self.array.outputs)
-        self._chunk = step_count(self._duration, self.dt) + 1
+        self._n_outputs = len(self.array.outputs)
+        self._plan = Plan(primitive, self.array, float(task.duration), self.dt)
+        self._chunk = step_count(self._plan.duration, self.dt) + 1
         self._fresh = step_filter(primitive, task, self.dt, self._chunk, self.array)
         self.reset()
 
@@ -117,21 +118,21 @@ class OnlineExecution:
         self._monitor: Monitor | None = None
         if self._detector is not None:
             self._monitor = self._detector.monitor(self.primitive, self.task, self.dt, self.array.outputs)
-        # What nobody else keeps or writes to, and the kernel looks at itself, is taken as it is.
-        self._takes_arrays = self._fresh.takes_any_values and self._monitor is None
+        self._plain = self._filter if isinstance(self._filter, PlainFilter) else None
+        self._is_alone = self._monitor is None and self._modulating is None
         self._step, self._clock_offset, self.n_dropped, self._n_late = 0, 0.0, 0, 0
-        self._counts = {name: SensorCounts() for name in self.array.names}
-        self._n_complete = 0
+        self._counts, self._n_counted = {name: SensorCounts() for name in self.array.names}, 0
         self._held: FloatArray | None = None
         self._last: ExecutionStep | None = None
 
     @property
     def sensor_counts(self) -> dict[str, SensorCounts]:
         """By name of each sensor: how many of its readings were used, rejected or missing so far."""
-        if self._n_complete:
+        n_complete = self._step - self._n_counted
+        if n_complete:  # of ticks at which nothing was missing no count is kept
             for counts in self._counts.values():
-                counts.add_fused(self._n_complete)
-            self._n_complete = 0
+                counts.add_fused(n_complete)
+            self._n_counted = self._step
         return self._counts
 
     @property
@@ -158,10 +159,11 @@ class OnlineExecution:
             outputs. NaN: not measured; None: nothing was.
         time : seconds since the start at which it was measured; the next tick unless given.
         """
-        if self._takes_arrays and is_plain(observation) and observation.shape == (self._n_outputs,):
-            measured = observation
-        else:
-            measured = observation_of(self.array, observation)
+        if time is None and self._plain is not None:  # which looks at it by itself
+            seen = self._plain.take(observation)
+            if seen is not None:
+                return self._reached(seen, seen) if self._is_alone else self._judged(np.array(observation), seen)
+        measured = observation_of(self.array, observation)
         if time is not None:
             due = self._tick_of(check_number(time, "time as a number of seconds"))
             if due < self._step and self._last is not None:
@@ -170,9 +172,7 @@ class OnlineExecution:
                 return self._last
             while self._step < due:
                 self._advance(np.full(len(measured), np.nan))
-        self._n_late = 0
-        self._last = self._advance(measured)
-        return self._last
+        return self._advance(measured)
 
     def _tick_of(self, time: float) -> int:
         """The tick that an observation belongs to; ticks before `self._step` are over."""
@@ -185,34 +185,46 @@ class OnlineExecution:
 
     def _advance(self, measured: FloatArray) -> ExecutionStep:
         """One tick: update with what is measured (Alg. 2, lines 5-8), predict the next state (lines 3-4)."""
-        time = self._step * self.dt
-        phase = phase_at(time, self._duration)
-        seen = commanded = self._filter.step(measured)
-        if seen.n_fused == self._n_outputs:
-            self._n_complete += 1
-        else:
-            self._count(seen)
-        test_ratio, verdict = math.nan, None
+        return self._judged(measured, self._filter.step(measured))
+
+    def _judged(self, measured: FloatArray, seen: SensedTick) -> ExecutionStep:
+        """What becomes of a tick that was filtered; what is measured is the monitor's to keep."""
+        commanded, test_ratio, verdict, held = seen, math.nan, None, None
         if self._monitor is not None:
-            test_ratio = self._monitor.update(self._observed(time, phase, measured, seen))
+            test_ratio = self._monitor.update(self._observed(measured, seen))
             verdict = self._monitor.verdict
         if self._modulating is not None:
             commanded = self._commanding.step(np.where(self._modulating, measured, np.nan))
-        held = None
         if self._on_alarm == "hold" and verdict is not None and verdict.failed:
             held = self._hold(commanded)
-        self._step += 1
-        due = self._step * self.dt
-        return ExecutionStep(due, phase, test_ratio, verdict, seen, commanded, held, self.primitive, self.array)
+        return self._reached(seen, commanded, test_ratio, verdict, held)
 
-    def _observed(self, time: float, phase: float, measured: FloatArray, seen: SensedTick) -> Observed:
-        signals = self.array.signals(measured)
+    def _reached(
+        self,
+        seen: SensedTick,
+        commanded: SensedTick,
+        test_ratio: float = math.nan,
+        verdict: Judgement | None = None,
+        held: FloatArray | None = None,
+    ) -> ExecutionStep:
+        """What comes out of a tick, which is over then."""
+        if seen.n_fused != self._n_outputs:
+            self._count(seen)
+        reached = tuple.__new__(ExecutionStep, (self._step, test_ratio, verdict, seen, commanded, held, self._plan))
+        self._last, self._n_late = reached, 0
+        self._step += 1
+        return reached
+
+    def _observed(self, measured: FloatArray, seen: SensedTick) -> Observed:
+        time, signals = self._step * self.dt, self.array.signals(measured)
+        phase = phase_at(time, self._plan.duration)
         return Observed(self._step, time, phase, signals, seen.contributions, seen.innovations, seen.innovation_variances)
 
     def _count(self, seen: SensedTick) -> None:
         innovations, fused, counts = seen.innovations, seen.fused, self.sensor_counts
         for name, part in self.array.slices.items():
             counts[name].add(innovations[part], fused[part])
+        self._n_counted += 1
 
     def _hold(self, commanded: SensedTick) -> FloatArray:
         """(D, 3) array: rest at the position due at the alarm."""

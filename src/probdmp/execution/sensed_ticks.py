@@ -8,8 +8,8 @@ from probdmp.checks import BoolArray, FloatArray
 
 __all__ = ["RECORD_SIZE", "RecordedTick", "SensedTick", "Tick"]
 
-RECORD_SIZE = 16
-"""Mean (3) and covariance (9) of the next state of a signal, innovation, its variance, log-likelihood, and the sum of these."""
+RECORD_SIZE = 15
+"""Mean (3) and covariance (9) of the next state of a signal, innovation, its variance, and log-likelihood."""
 
 
 class SensedTick(Protocol):
@@ -87,45 +87,46 @@ class RecordedTick(NamedTuple):
     """A tick as the kernel writes it, one output for each signal; arrays are made of it when they are asked for."""
 
     n_fused: int
-    record: FloatArray
-    """(RECORD_SIZE, S) array."""
+    n_outputs: int
+    """S."""
+    log_likelihood: float
+    record: bytes
+    """A float64 array (RECORD_SIZE, W), of which the first S columns count."""
 
     @property
     def mean(self) -> FloatArray:
         """(S, 3) array."""
-        return self.record[:3].T
+        return self._rows()[:3].T
 
     @property
     def covariance(self) -> FloatArray:
         """(S, 3, 3) array."""
-        return self.record[3:12].reshape(3, 3, -1).transpose(2, 0, 1)
-
-    @property
-    def log_likelihood(self) -> float:
-        """Nats."""
-        return self.record.item(15, 0)
+        return self._rows()[3:12].reshape(3, 3, -1).transpose(2, 0, 1)
 
     @property
     def contributions(self) -> FloatArray:
         """(S,) array."""
-        return self.record[14]
+        return self._rows()[14]
 
     @property
     def innovations(self) -> FloatArray:
         """(S,) array."""
-        return self.record[12]
+        return self._rows()[12]
 
     @property
     def innovation_covariance(self) -> FloatArray:
         """(S, S) array."""
-        return np.diag(self.record[13])
+        return np.diag(self.innovation_variances)
 
     @property
     def innovation_variances(self) -> FloatArray:
         """(S,) array."""
-        return self.record[13]
+        return self._rows()[13]
 
     @property
     def fused(self) -> BoolArray:
         """(S,) array."""
-        return ~np.isnan(self.record[12])
+        return ~np.isnan(self.innovations)
+
+    def _rows(self) -> FloatArray:
+        return np.frombuffer(self.record).reshape(RECORD_SIZE, -1)[:, : self.n_outputs]

@@ -4,14 +4,14 @@ from typing import Protocol
 
 import numpy as np
 
-from probdmp.checks import FloatArray, check_array
+from probdmp.checks import FloatArray
 from probdmp.dmp import Primitive, Task, linear_gaussian_model
 from probdmp.execution.independent_filtering import look_through, of_each_dof, sensed_system
 from probdmp.execution.joint_steps import LATER_CHUNK, joint_filter
 from probdmp.execution.sensed_ticks import RECORD_SIZE, RecordedTick, SensedTick, Tick
 from probdmp.execution.sensor_array import SensorArray
 from probdmp.gaussian import block_diagonal, kernels, output_shares, predict, update
-from probdmp.gaussian.scalar_systems import scalar_systems
+from probdmp.gaussian.scalar_systems import ScalarSystems, scalar_systems
 
 __all__ = ["StepFilter", "step_filter"]
 
@@ -21,9 +21,6 @@ class StepFilter(Protocol):
 
     It replaces what it holds and does not write into it: a copy goes its own way.
     """
-
-    takes_any_values: bool
-    """Whether it refuses by itself what is infinite; to others only checked observations are given."""
 
     def step(self, observation: FloatArray) -> SensedTick:
         """Take in an observation, (O,) array, NaN where nothing was measured, and go on to the next tick."""
@@ -47,50 +44,58 @@ def step_filter(primitive: Primitive, task: Task, dt: float, chunk: int, array: 
 class PlainFilter:
     """The paper's Kalman filter where each degree of freedom has a sensor of its own."""
 
-    takes_any_values = True
-
     def __init__(self, primitive: Primitive, task: Task, dt: float, chunk: int, array: SensorArray) -> None:
         self._primitive, self._task, self._dt, self._array = primitive, task, dt, array
-        self._step = 0
-        self._load(chunk)
-        self._record = np.zeros((RECORD_SIZE, self._system.shape[1]))
-        start, n = self._systems, len(array.outputs)
-        self._record[:3, :n], self._record[3:12, :n] = start.initial_mean.T, start.initial_covariance.reshape(-1, 9).T
+        self._first, n = 0, len(array.outputs)
+        start, record = self._load(chunk), np.zeros((RECORD_SIZE, _width(n)))
+        record[:3, :n], record[3:12, :n] = start.initial_mean.T, start.initial_covariance.reshape(-1, 9).T
+        self._record = record.tobytes()
 
     def step(self, observation: FloatArray) -> RecordedTick:
         """Alg. 2, lines 3-8."""
-        k = self._step - self._first
-        if k == len(self._inputs):
-            self._load(LATER_CHUNK)
-            k = 0
-        record = np.empty(self._record.shape)
-        n_fused = kernels.filter_step(self._system, self._inputs, observation, self._record, record, k)
-        if n_fused < 0:
-            check_array(observation, "observation", observation.shape, missing=True)
-        self._record, self._step = record, self._step + 1
-        return RecordedTick(n_fused, record[:, : len(observation)])
+        taken = self.take(observation)
+        assert taken is not None, "it was checked"
+        return taken
 
-    def _load(self, chunk: int) -> None:
-        self._first = self._step
-        model = linear_gaussian_model(self._primitive, self._task, self._dt, chunk + 1, self._step)
-        self._systems = s = scalar_systems(sensed_system(model, self._array))
+    def take(self, observation: object) -> RecordedTick | None:
+        """The same of what was not checked: None, and nothing is done, unless it is an array that can be an observation."""
+        if self._k == self._n_prepared:
+            self._first += self._k
+            self._load(LATER_CHUNK)
+        told = self._prepared.take(observation, self._record, self._k)
+        if told is None:
+            return None
+        self._record = told[3]
+        self._k += 1
+        return tuple.__new__(RecordedTick, told)
+
+    def _load(self, chunk: int) -> ScalarSystems:
+        """Prepare the next ticks."""
+        model = linear_gaussian_model(self._primitive, self._task, self._dt, chunk + 1, self._first)
+        s = scalar_systems(sensed_system(model, self._array))
         transition = s.transition.reshape(len(s.noise), -1)
-        self._system = _padded(np.concatenate([transition, s.input_vector, s.sensor, s.noise[:, None]], axis=1).T)
-        self._system[-1, len(s.noise) :] = 1.0  # noise of nothing, which is divided by
-        inputs = np.concatenate([s.drifts, s.input_variances[..., None]], axis=-1)
-        self._inputs = _padded(inputs.swapaxes(1, 2))
+        system = _padded(np.concatenate([transition, s.input_vector, s.sensor, s.noise[:, None]], axis=1).T)
+        system[-1, len(s.noise) :] = 1.0  # noise of nothing, which is divided by
+        inputs = np.concatenate([s.drifts, s.input_variances[..., None]], axis=-1).swapaxes(1, 2)
+        self._prepared = kernels.PreparedSteps(system, _padded(inputs), len(s.noise))
+        self._k, self._n_prepared = 0, len(inputs)
+        return s
+
+
+def _width(n_systems: int) -> int:
+    """How long the kernel wants the rows of so many systems."""
+    return -(-n_systems // kernels.LANE) * kernels.LANE
 
 
 def _padded(rows: FloatArray) -> FloatArray:
-    """Rows (…, S) as long as the kernel wants them, with zeros beyond S."""
-    missing = -rows.shape[-1] % kernels.LANE
-    return np.ascontiguousarray(np.concatenate([rows, np.zeros((*rows.shape[:-1], missing))], axis=-1))
+    """Rows (…, S) as long as that, with zeros beyond S."""
+    padded = np.zeros((*rows.shape[:-1], _width(rows.shape[-1])))
+    padded[..., : rows.shape[-1]] = rows
+    return padded
 
 
 class IndependentFilter:
     """The paper's Kalman filter, whatever the sensors."""
-
-    takes_any_values = False
 
     def __init__(self, primitive: Primitive, task: Task, dt: float, chunk: int, array: SensorArray) -> None:
         self._primitive, self._task, self._dt, self._array = primitive, task, dt, array

@@ -186,6 +186,13 @@ typedef struct {
     const double *floors;
 } Contrary;
 
+/* Outputs of maps of one window, under some accounts of it. */
+typedef struct {
+    Py_ssize_t n_outputs, n_inputs, n_accounts, n_sums;
+    const double *maps, *window;
+    const int64_t *which, *reach, *ends;
+} OneWindow;
+
 /* Recordings (N, T, S), and points between their samples: (before - after) beyond + after, less the start, in ranges. */
 typedef struct {
     Py_ssize_t n, n_times, n_signals, n_points;
@@ -252,6 +259,9 @@ typedef struct {
 #define factorise_lane NAMED(factorise_lane)
 #define whiten_all NAMED(whiten_all)
 
+#define scalar_product NAMED(scalar_product)
+#define square_window NAMED(square_window)
+
 #define look_for_odd NAMED(look_for_odd)
 #define draw_lines NAMED(draw_lines)
 
@@ -277,6 +287,7 @@ static void look_at_processor(void) {}
 #undef look_at_windows
 #undef weigh_all
 #undef whiten_all
+#undef square_window
 #undef look_for_odd
 #undef draw_lines
 #undef step_all
@@ -317,43 +328,135 @@ static PyObject *filter_systems(PyObject *module, PyObject *const *arguments, Py
     Py_RETURN_NONE;
 }
 
-/* ---- filter_step -------------------------------------------------------------------------------------------------------- */
+/* ---- PreparedSteps ------------------------------------------------------------------------------------------------------ */
 
-static PyObject *filter_step(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
+/* Systems and their inputs, checked and held once, so that a tick has one array to look at. */
+typedef struct {
+    PyObject_HEAD
+    Array arrays[2]; /* system, inputs */
+    int n_held;
+    PyTypeObject *kind; /* of these arrays: others, whose numbers may not be what they say, are not taken */
+    Py_ssize_t n_states, n_outputs, stride, n_steps, n_bytes;
+} PreparedSteps;
+
+static int hold(PreparedSteps *self, PyObject *const *arguments, Py_ssize_t n_outputs)
 {
-    static const Spec specs[] = {
-        {"system", 0, 2, 0}, {"inputs", 0, 3, 0}, {"observation", 0, 1, 0}, {"before", 0, 2, 0}, {"after", 1, 2, 0},
-    };
-    enum { COUNT = sizeof(specs) / sizeof(specs[0]) };
-    Array x[COUNT];
-    if (given != COUNT + 1) {
-        PyErr_Format(PyExc_TypeError, "expected %d arrays and a number, got %zd arguments", COUNT, given);
+    static const Spec specs[] = {{"system", 0, 2, 0}, {"inputs", 0, 3, 0}};
+    if (take(arguments, 2, specs, 2, self->arrays) < 0) return -1;
+    self->n_held = 2;
+    const Py_ssize_t *shape = self->arrays[1].view.shape, n = shape[1] - 1, stride = shape[2];
+    if (!few_states(n) || !agree(&self->arrays[0], "system", n * n + 2 * n + 1, stride, 0, 0)) return -1;
+    if (stride % WIDTH || n_outputs < 1 || n_outputs > stride || n_outputs <= stride - WIDTH) {
+        PyErr_Format(PyExc_ValueError, "expected rows padded from %zd to a multiple of %d, got %zd", n_outputs, WIDTH, stride);
+        return -1;
+    }
+    self->kind = (PyTypeObject *)Py_NewRef((PyObject *)Py_TYPE(arguments[0]));
+    self->n_states = n;
+    self->n_outputs = n_outputs;
+    self->stride = stride;
+    self->n_steps = shape[0];
+    self->n_bytes = (n * n + n + 3) * stride * (Py_ssize_t)sizeof(double);
+    return 0;
+}
+
+static PyObject *prepare_steps(PyTypeObject *type, PyObject *arguments, PyObject *named)
+{
+    PyObject *arrays[2];
+    Py_ssize_t n_outputs;
+    if (named != NULL && PyDict_Size(named)) {
+        PyErr_SetString(PyExc_TypeError, "expected arguments without names");
         return NULL;
     }
-    const Py_ssize_t step = PyLong_AsSsize_t(arguments[COUNT]);
-    if (step == -1 && PyErr_Occurred()) return NULL;
-    if (take(arguments, COUNT, specs, COUNT, x) < 0) return NULL;
-    const Py_ssize_t d = x[2].view.shape[0], stride = x[4].view.shape[1], steps = x[1].view.shape[0];
-    const Py_ssize_t n = x[1].view.shape[1] - 1;
-    Py_ssize_t n_seen = 0;
-    int fits = few_states(n) && agree(&x[0], "system", n * n + 2 * n + 1, stride, 0, 0)
-               && agree(&x[1], "inputs", steps, n + 1, stride, 0) && agree(&x[3], "before", n * n + n + 4, stride, 0, 0)
-               && agree(&x[4], "after", n * n + n + 4, stride, 0, 0);
-    if (fits && (stride % WIDTH || d > stride || d <= stride - WIDTH)) {
-        PyErr_Format(PyExc_ValueError, "expected rows padded from %zd to a multiple of %d, got %zd", d, WIDTH, stride);
-        fits = 0;
+    if (!PyArg_ParseTuple(arguments, "OOn", &arrays[0], &arrays[1], &n_outputs)) return NULL;
+    PreparedSteps *self = (PreparedSteps *)PyType_GenericAlloc(type, 0);
+    if (self != NULL && hold(self, arrays, n_outputs) < 0) {
+        Py_DECREF(self);
+        return NULL;
     }
-    if (fits && (step < 0 || step >= steps)) {
-        PyErr_Format(PyExc_ValueError, "expected a step of %zd, got %zd", steps, step);
-        fits = 0;
-    }
-    if (fits) {
-        const double *now = x[1].data + step * (n + 1) * stride;
-        n_seen = CHOOSE(step_all)((int)n, d, stride, x[0].data, now, x[2].data, x[3].data, x[4].data);
-    }
-    release(x, COUNT);
-    return fits ? PyLong_FromSsize_t(n_seen) : NULL;
+    return (PyObject *)self;
 }
+
+static void forget_steps(PyObject *object)
+{
+    PreparedSteps *self = (PreparedSteps *)object;
+    PyTypeObject *type = Py_TYPE(object);
+    release(self->arrays, self->n_held);
+    Py_XDECREF((PyObject *)self->kind);
+    PyObject_Free(object);
+    Py_DECREF((PyObject *)type);
+}
+
+/* (n_seen, n_outputs, log-likelihood, record); takes over the record. */
+static PyObject *told_of_step(const PreparedSteps *self, Py_ssize_t n_seen, double log_likelihood, PyObject *record)
+{
+    PyObject *told = PyTuple_New(4), *parts[4];
+    parts[0] = PyLong_FromSsize_t(n_seen);
+    parts[1] = PyLong_FromSsize_t(self->n_outputs);
+    parts[2] = PyFloat_FromDouble(log_likelihood);
+    parts[3] = record;
+    int has_memory = told != NULL;
+    for (int i = 0; i < 4; i++) {
+        has_memory = has_memory && parts[i] != NULL;
+        if (told != NULL)
+            PyTuple_SetItem(told, i, parts[i]);
+        else
+            Py_XDECREF(parts[i]);
+    }
+    if (has_memory) return told;
+    Py_XDECREF(told);
+    return NULL;
+}
+
+static PyObject *take_step(PyObject *object, PyObject *const *arguments, Py_ssize_t given)
+{
+    const PreparedSteps *self = (PreparedSteps *)object;
+    if (given != 3) {
+        PyErr_Format(PyExc_TypeError, "expected an observation, a record and a step, got %zd arguments", given);
+        return NULL;
+    }
+    const Py_ssize_t step = PyLong_AsSsize_t(arguments[2]), n = self->n_states;
+    if (step == -1 && PyErr_Occurred()) return NULL;
+    if (step < 0 || step >= self->n_steps) {
+        PyErr_Format(PyExc_ValueError, "expected a step of %zd, got %zd", self->n_steps, step);
+        return NULL;
+    }
+    if (!PyBytes_Check(arguments[1]) || PyBytes_Size(arguments[1]) != self->n_bytes) {
+        PyErr_Format(PyExc_ValueError, "before: expected a record of %zd bytes", self->n_bytes);
+        return NULL;
+    }
+    Py_buffer view;
+    if (Py_TYPE(arguments[0]) != self->kind) Py_RETURN_NONE;
+    if (PyObject_GetBuffer(arguments[0], &view, PyBUF_C_CONTIGUOUS | PyBUF_FORMAT) < 0) {
+        PyErr_Clear();
+        Py_RETURN_NONE;
+    }
+    PyObject *record = NULL;
+    Py_ssize_t n_seen = -1;
+    double log_likelihood = 0;
+    const int fits = view.ndim == 1 && view.shape[0] == self->n_outputs && view.format && !strcmp(view.format, "d");
+    if (fits && (record = PyBytes_FromStringAndSize(NULL, self->n_bytes)) != NULL) {
+        const double *now = self->arrays[1].data + step * (n + 1) * self->stride;
+        n_seen = CHOOSE(step_all)((int)n, self->n_outputs, self->stride, self->arrays[0].data, now, view.buf,
+                                  (const double *)PyBytes_AsString(arguments[1]), (double *)PyBytes_AsString(record),
+                                  &log_likelihood);
+    }
+    PyBuffer_Release(&view);
+    if (fits && record == NULL) return NULL;
+    if (n_seen >= 0) return told_of_step(self, n_seen, log_likelihood, record);
+    Py_XDECREF(record);
+    Py_RETURN_NONE;
+}
+
+static PyMethodDef step_methods[] = {
+    {"take", (PyCFunction)(void (*)(void))take_step, METH_FASTCALL, NULL},
+    {NULL, NULL, 0, NULL},
+};
+
+static PyType_Slot step_slots[] = {
+    {Py_tp_new, (void *)prepare_steps}, {Py_tp_dealloc, (void *)forget_steps}, {Py_tp_methods, step_methods}, {0, NULL},
+};
+
+static PyType_Spec step_spec = {"probdmp.gaussian._kernels.PreparedSteps", sizeof(PreparedSteps), 0, Py_TPFLAGS_DEFAULT, step_slots};
 
 /* ---- Series that share their gains -------------------------------------------------------------------------------------- */
 
@@ -640,6 +743,33 @@ static PyObject *window_ratios(PyObject *module, PyObject *const *arguments, Py_
     Py_RETURN_NONE;
 }
 
+/* ---- One window --------------------------------------------------------------------------------------------------------- */
+
+static PyObject *window_sums(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
+{
+    static const Spec specs[] = {{"maps", 0, 3, 0}, {"which", 0, 1, 1}, {"reach", 0, 1, 1}, {"window", 0, 1, 0},
+                                 {"ends", 0, 1, 1}, {"sums", 1, 2, 0}};
+    enum { COUNT = sizeof(specs) / sizeof(specs[0]) };
+    Array x[COUNT];
+    if (take(arguments, given, specs, COUNT, x) < 0) return NULL;
+    const OneWindow s = {
+        .n_outputs = x[0].view.shape[1], .n_inputs = x[0].view.shape[2], .n_accounts = x[1].view.shape[0],
+        .n_sums = x[4].view.shape[0] - 1, .maps = x[0].data, .which = x[1].integers, .reach = x[2].integers,
+        .window = x[3].data, .ends = x[4].integers,
+    };
+    const int fits = agree(&x[2], "reach", s.n_outputs, 0, 0, 0) && agree(&x[5], "sums", s.n_sums, s.n_accounts, 0, 0);
+    int is_sound = fits && x[3].view.shape[0] <= s.n_inputs && s.ends[0] >= 0 && s.ends[s.n_sums] <= s.n_outputs;
+    for (Py_ssize_t a = 0; is_sound && a < s.n_accounts; a++) is_sound = s.which[a] >= 0 && s.which[a] < x[0].view.shape[0];
+    for (Py_ssize_t j = 0; is_sound && j < s.n_sums; j++) is_sound = s.ends[j] < s.ends[j + 1];
+    for (Py_ssize_t i = is_sound ? s.ends[0] : 0; is_sound && i < s.ends[s.n_sums]; i++)
+        is_sound = s.reach[i] >= 0 && s.reach[i] <= x[3].view.shape[0];
+    if (is_sound) CHOOSE(square_window)(&s, x[5].data);
+    release(x, COUNT);
+    if (is_sound) Py_RETURN_NONE;
+    if (fits) PyErr_SetString(PyExc_ValueError, "maps, which, reach, window and ends do not belong together");
+    return NULL;
+}
+
 /* ---- Small matrices ----------------------------------------------------------------------------------------------------- */
 
 static PyObject *whiten(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
@@ -722,13 +852,21 @@ static PyObject *points_on_lines(PyObject *module, PyObject *const *arguments, P
 #define FUNCTION(name) {#name, (PyCFunction)(void (*)(void))name, METH_FASTCALL, NULL}
 
 static PyMethodDef functions[] = {
-    FUNCTION(filter_systems), FUNCTION(filter_step), FUNCTION(squared_innovations), FUNCTION(smoothed_states),
-    FUNCTION(smooth_backwards), FUNCTION(least_squares), FUNCTION(window_evidence), FUNCTION(window_ratios), FUNCTION(whiten),
+    FUNCTION(filter_systems), FUNCTION(squared_innovations), FUNCTION(smoothed_states), FUNCTION(smooth_backwards),
+    FUNCTION(least_squares), FUNCTION(window_evidence), FUNCTION(window_ratios), FUNCTION(window_sums), FUNCTION(whiten),
     FUNCTION(plain_recordings), FUNCTION(points_on_lines),
     {NULL, NULL, 0, NULL},
 };
 
-static PyModuleDef_Slot slots[] = {{0, NULL}};
+static int add_types(PyObject *module)
+{
+    PyObject *type = PyType_FromSpec(&step_spec);
+    const int added = type == NULL ? -1 : PyModule_AddObjectRef(module, "PreparedSteps", type);
+    Py_XDECREF(type);
+    return added;
+}
+
+static PyModuleDef_Slot slots[] = {{Py_mod_exec, (void *)add_types}, {0, NULL}};
 
 static struct PyModuleDef definition = {
     PyModuleDef_HEAD_INIT, "_kernels", "The loops of probdmp.gaussian, compiled; see _kernels_numpy.py.", 0, functions, slots,
@@ -965,10 +1103,10 @@ INLINE int any_above(Lane x, Lane floor)
 #endif
 }
 
-/* ---- filter_step -------------------------------------------------------------------------------------------------------- */
+/* ---- PreparedSteps ------------------------------------------------------------------------------------------------------ */
 
 /* WIDTH degrees of freedom at once; each number of theirs is in a row of its own, `stride` long. Rows of `system` are A, b, c, r; of
-   `inputs` the drift and u; of a record m and V of the next tick, then e, S and the log-likelihood of this one, and its sum. */
+   `inputs` the drift and u; of a record m and V of the next tick, then e, S and the log-likelihood of this one. */
 INLINE void step_lane(int n, Py_ssize_t stride, const double *system, const double *inputs, Lane observed, const double *before,
                       double *after)
 {
@@ -991,9 +1129,10 @@ INLINE void step_lane(int n, Py_ssize_t stride, const double *system, const doub
         e = plus_product(e, times(-1.0, c[i]), m[i]);
         s = plus_product(s, c[i], spread[i]);
     }
+    const Lane seen = where_seen(e, e), nats = plus_number(plus_product(logarithm(s), e, quotient(e, s)), LOG_2PI);
     store(after + (n + n * n) * stride, e);
     store(after + (n + n * n + 1) * stride, s);
-    const Lane seen = where_seen(e, e);
+    store(after + (n + n * n + 2) * stride, where_seen(times(-0.5, nats), e));
     UNROLL for (int i = 0; i < n; i++) {
         gain[i] = where_seen(quotient(spread[i], s), e);
         m[i] = plus_product(m[i], gain[i], seen);
@@ -1033,10 +1172,9 @@ INLINE void step_lane(int n, Py_ssize_t stride, const double *system, const doub
 
 /* How many were observed; -1 if one cannot be squared. The rows are padded to a multiple of WIDTH. */
 static Py_ssize_t step_all(int n, Py_ssize_t n_dof, Py_ssize_t stride, const double *system, const double *inputs,
-                           const double *observed, const double *before, double *after)
+                           const double *observed, const double *before, double *after, double *log_likelihood)
 {
-    const double *e = after + (n + n * n) * stride, *s = e + stride;
-    double *log_likelihood = after + (n + n * n + 2) * stride;
+    const double *shares = after + (n + n * n + 2) * stride;
     Py_ssize_t n_seen = 0;
     for (Py_ssize_t d = 0; d < n_dof; d++) {
         if (fabs(observed[d]) > LARGEST_MAGNITUDE) return -1;
@@ -1050,12 +1188,7 @@ static Py_ssize_t step_all(int n, Py_ssize_t n_dof, Py_ssize_t stride, const dou
         WITH_STATES(n, BODY)
 #undef BODY
     }
-    double total = 0;
-    for (Py_ssize_t d = 0; d < stride; d++) {
-        log_likelihood[d] = isnan(e[d]) || d >= n_dof ? 0 : -0.5 * (e[d] * e[d] / s[d] + log(s[d]) + LOG_2PI);
-        total += log_likelihood[d];
-    }
-    for (Py_ssize_t d = 0; d < stride; d++) log_likelihood[stride + d] = total;
+    for (Py_ssize_t d = 0; d < n_dof; d++) *log_likelihood += shares[d];
     return n_seen;
 }
 
@@ -1565,6 +1698,36 @@ static void weigh_all(const Windows *s, const Contrary *c, double *found)
                 weigh_windows(s, c, place, first, width, found);
             else
                 weigh_rest(s, c, most, place, first, width, found);
+        }
+    }
+}
+
+/* ---- One window --------------------------------------------------------------------------------------------------------- */
+
+INLINE double scalar_product(const double *x, const double *y, Py_ssize_t n)
+{
+    double numbers[WIDTH] = {0}, product = 0;
+    Lane sum = load(numbers);
+    Py_ssize_t i = 0;
+    for (; i + WIDTH <= n; i += WIDTH) sum = plus_product(sum, load(x + i), load(y + i));
+    store(numbers, sum);
+    for (int w = 0; w < WIDTH; w++) product += numbers[w];
+    for (; i < n; i++) product += x[i] * y[i];
+    return product;
+}
+
+/* Sums (J, A) of the squares of the outputs from each end to the next; each depends on as many inputs as it reaches. */
+static void square_window(const OneWindow *s, double *sums)
+{
+    for (Py_ssize_t a = 0; a < s->n_accounts; a++) {
+        const double *map = s->maps + s->which[a] * s->n_outputs * s->n_inputs;
+        for (Py_ssize_t j = 0; j < s->n_sums; j++) {
+            double sum = 0;
+            for (Py_ssize_t i = s->ends[j]; i < s->ends[j + 1]; i++) {
+                const double output = scalar_product(map + i * s->n_inputs, s->window, s->reach[i]);
+                sum += output * output;
+            }
+            sums[j * s->n_accounts + a] = sum;
         }
     }
 }

@@ -7,7 +7,7 @@ All arrays are float64 and C-contiguous; the last arguments are written to. NaN 
 
 import numpy as np
 
-from probdmp.checks import LARGEST_MAGNITUDE, FloatArray
+from probdmp.checks import LARGEST_MAGNITUDE, FloatArray, is_plain
 from probdmp.gaussian._recordings_numpy import (
     least_squares,
     plain_recordings,
@@ -16,10 +16,11 @@ from probdmp.gaussian._recordings_numpy import (
     whiten,
     window_evidence,
     window_ratios,
+    window_sums,
 )
 
 __all__ = [
-    "filter_step",
+    "PreparedSteps",
     "filter_systems",
     "least_squares",
     "plain_recordings",
@@ -31,6 +32,7 @@ __all__ = [
     "whiten",
     "window_evidence",
     "window_ratios",
+    "window_sums",
 ]
 
 LOG_2PI = float(np.log(2 * np.pi))
@@ -79,40 +81,49 @@ def filter_systems(
         means[t], covariances[t] = mean, covariance
 
 
-def filter_step(
-    system: FloatArray, inputs: FloatArray, observation: FloatArray, before: FloatArray, after: FloatArray, step: int
-) -> int:
-    """One tick of D systems: update with what was observed, then predict. Each number of theirs has a row of length W >= D.
+class PreparedSteps:
+    """D systems, ready to be filtered tick by tick: each number of theirs has a row of length W >= D.
 
     Parameters
     ----------
     system : (n n + 2 n + 1, W) array, rows A, b, c, r.
     inputs : (T, n + 1, W) array, drift and input variance of each step.
-    observation : (D,) array.
-    before : (n + n n + 4, W) array, the record whose first rows are m and V of the state as predicted.
-    after : written, likewise: m and V of the next tick, then innovation, its variance S and log-likelihood of this one, and the
-        sum of these.
-    step : which of the inputs drives the step that follows.
-
-    Returns
-    -------
-    How many were observed; -1 if one is infinite, or too large to be squared, and then nothing is written.
+    n_outputs : D.
     """
-    if np.any(np.abs(observation) > LARGEST_MAGNITUDE):
-        return -1
-    inputs = inputs[step]
-    n, width = len(inputs) - 1, inputs.shape[1]
-    a, (b, c, r) = system[: n * n].T.reshape(width, n, n), np.split(system[n * n :].T, [n, 2 * n], axis=1)
-    observed = np.zeros(width)
-    observed[: len(observation)] = observation
-    mean, covariance, innovation, variance, log_likelihood, _ = _update(
-        c, r[:, 0], observed, before[:n].T, before[n : n + n * n].T.reshape(width, n, n)
-    )
-    mean, covariance = _predict(a, b, inputs[:n].T, inputs[n], mean, covariance)
-    after[:n], after[n : n + n * n] = mean.T, covariance.reshape(width, -1).T
-    log_likelihood[len(observation) :] = 0.0
-    after[-4], after[-3], after[-2], after[-1] = innovation, variance, log_likelihood, log_likelihood.sum()
-    return int(np.sum(~np.isnan(observation)))
+
+    def __init__(self, system: FloatArray, inputs: FloatArray, n_outputs: int) -> None:
+        n, width = inputs.shape[1] - 1, inputs.shape[2]
+        self._transition = system[: n * n].T.reshape(width, n, n)
+        self._b, self._c, r = np.split(system[n * n :].T, [n, 2 * n], axis=1)
+        self._r, self._inputs, self._n_outputs = r[:, 0], inputs, n_outputs
+
+    def take(self, observation: object, before: bytes, step: int) -> tuple[int, int, float, bytes] | None:
+        """One tick: update with what was observed, then predict.
+
+        Parameters
+        ----------
+        observation : anything; a contiguous float64 array (D,) is taken.
+        before : the record whose first rows are m and V of the state as predicted.
+        step : which of the inputs drives the step that follows.
+
+        Returns
+        -------
+        How many of D outputs were observed, D, their log-likelihood, and a record, a float64 array (n + n n + 3, W) as bytes:
+        m and V of the next tick, then innovation, its variance S and log-likelihood of each output at this one. None if the
+        observation is not what can be taken, or one of its numbers is infinite or too large to be squared.
+        """
+        if not is_plain(observation) or observation.shape != (self._n_outputs,):
+            return None
+        if np.any(np.abs(observation) > LARGEST_MAGNITUDE):
+            return None
+        width, n = self._c.shape
+        rows, now, d = np.frombuffer(before).reshape(-1, width), self._inputs[step], self._n_outputs
+        observed = np.zeros(width)
+        observed[:d] = observation
+        mean, covariance, *told, _ = _update(self._c, self._r, observed, rows[:n].T, rows[n : n + n * n].T.reshape(width, n, n))
+        mean, covariance = _predict(self._transition, self._b, now[:n].T, now[n], mean, covariance)
+        record = np.concatenate([mean.T, covariance.reshape(width, -1).T, told])
+        return int(np.sum(~np.isnan(observation))), d, float(record[-1, :d].sum()), record.tobytes()
 
 
 def squared_innovations(

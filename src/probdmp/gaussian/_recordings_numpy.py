@@ -7,7 +7,16 @@ import numpy as np
 
 from probdmp.checks import FloatArray, IntArray
 
-__all__ = ["least_squares", "plain_recordings", "points_on_lines", "split_sums", "whiten", "window_evidence", "window_ratios"]
+__all__ = [
+    "least_squares",
+    "plain_recordings",
+    "points_on_lines",
+    "split_sums",
+    "whiten",
+    "window_evidence",
+    "window_ratios",
+    "window_sums",
+]
 
 FEW = 16
 """Executions up to which all places are multiplied at once: then the calls cost more than the numbers."""
@@ -112,6 +121,25 @@ def _squares(
                 sums[j][place] += sums[j - 1][place]
             begin = end
     return sums
+
+
+def window_sums(
+    maps: FloatArray, which: IntArray, reach: IntArray, window: FloatArray, ends: IntArray, sums: FloatArray
+) -> None:
+    """Squared lengths of the outputs of one window, from each of several ends to the next.
+
+    Parameters
+    ----------
+    maps, reach : as for `least_squares`.
+    which : (A,) the maps of the place, for A accounts of it.
+    window : its first numbers, as many as the outputs reach.
+    ends : (J + 1) increasing.
+    sums : written, (J, A).
+    """
+    begin, end = ends[0], ends[-1]
+    for account, number in enumerate(which):
+        outputs = maps[number, begin:end, : len(window)] @ window
+        sums[:, account] = np.add.reduceat(outputs * outputs, ends[:-1] - begin)
 
 
 def window_evidence(

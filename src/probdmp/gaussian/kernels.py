@@ -16,7 +16,7 @@ __all__ = [
     "COMPILED",
     "LANE",
     "MOST_STATES",
-    "filter_step",
+    "PreparedSteps",
     "filter_systems",
     "in_threads",
     "least_squares",
@@ -29,6 +29,7 @@ __all__ = [
     "whiten",
     "window_evidence",
     "window_ratios",
+    "window_sums",
 ]
 
 
@@ -50,12 +51,12 @@ _kernels = _chosen()
 COMPILED = _kernels is not _kernels_numpy
 """Whether the compiled kernels are in use."""
 LANE = 8
-"""Systems that `filter_step` filters at once: its rows are padded to a multiple of it."""
+"""Systems that `PreparedSteps` filters at once: its rows are padded to a multiple of it."""
 MOST_STATES = 4
 """States of a system that the kernels can filter."""
 
 filter_systems: Callable[..., None] = _kernels.filter_systems
-filter_step: Callable[..., int] = _kernels.filter_step
+PreparedSteps: type[_kernels_numpy.PreparedSteps] = _kernels.PreparedSteps
 squared_innovations: Callable[..., None] = _kernels.squared_innovations
 smoothed_states: Callable[..., None] = _kernels.smoothed_states
 
@@ -69,6 +70,7 @@ least_squares: Callable[..., None] = _kernels.least_squares
 window_evidence: Callable[..., None] = _kernels.window_evidence
 window_ratios: Callable[..., None] = _kernels.window_ratios
 whiten: Callable[..., bool] = _kernels.whiten
+window_sums: Callable[..., None] = _kernels.window_sums
 plain_recordings: Callable[..., None] = _kernels.plain_recordings
 points_on_lines: Callable[..., None] = _kernels.points_on_lines
 split_sums = _kernels_numpy.split_sums
