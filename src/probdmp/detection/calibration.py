@@ -72,7 +72,6 @@ class Calibration:
         if len(self.maxima) < 2 or len(self.maxima) != len(self.labels):
             raise InputError("at least two calibration executions, each with a label", f"{len(self.maxima)}")
         self._sorted = np.sort(self.maxima, axis=0)
-        self._ranked = self._sorted.T.tolist()
         self._handicaps = np.broadcast_to(handicaps, self.maxima.shape[1:])
         self._floors = np.broadcast_to(floors, self.maxima.shape[1:])
         least = np.maximum(self._floors, np.finfo(float).tiny)
@@ -81,6 +80,9 @@ class Calibration:
         excesses = np.where(beyond, np.log(np.maximum(self.maxima, self._starts) / self._starts), 0.0)
         self._exponents = (excesses.sum(axis=0) + TAIL_PRIOR_COUNT * TAIL_PRIOR) / (beyond.sum(axis=0) + TAIL_PRIOR_COUNT)
         self._tail_surprises = -np.log((beyond.sum(axis=0) + 1) / (self.n + 1))
+        by_channel = self._starts, self._tail_surprises, self._exponents, self._handicaps
+        self._known = list(zip(self._sorted.T.tolist(), *(numbers.tolist() for numbers in by_channel), strict=True))
+        """Of each channel, as `_surprise_now` takes it."""
         self.statistics = self.surprise(self.maxima).max(axis=-1)
         self.threshold, self.is_conformal = self._threshold()
 
@@ -159,15 +161,17 @@ class Calibration:
 
     def surprises_now(self, values: FloatArray) -> list[float]:
         """The same for the values (C,) of one moment, fast enough for a control loop."""
-        surprises = [self._surprise_of(channel, float(value)) for channel, value in enumerate(values)]
-        return [max(surprise - float(h), 0.0) for surprise, h in zip(surprises, self._handicaps, strict=True)]
+        return [self._surprise_now(value, *known) for value, known in zip(values.tolist(), self._known, strict=True)]
 
-    def _surprise_of(self, channel: int, value: float) -> float:
-        start = self._starts[channel]
+    def _surprise_now(
+        self, value: float, ranked: list[float], start: float, tail_surprise: float, exponent: float, handicap: float
+    ) -> float:
         if value > start:
-            return float(self._tail_surprises[channel] + log(value / start) / self._exponents[channel])
-        above = self.n - (bisect_left(self._ranked[channel], value) if value > 0 else 0)
-        return float(min(-log((above + 1) / (self.n + 1)), self._tail_surprises[channel]))
+            surprise = tail_surprise + log(value / start) / exponent
+        else:
+            above = self.n - (bisect_left(ranked, value) if value > 0 else 0)
+            surprise = min(-log((above + 1) / (self.n + 1)), tail_surprise)
+        return max(surprise - handicap, 0.0)
 
     @staticmethod
     def _chance_in_tail(above: NDArray[np.bool_], own: NDArray[np.bool_], share: float) -> float:

@@ -20,7 +20,7 @@ class ExecutionTicks:
         self.sensors = SensorWatch(profile, ranges, self._n_dof, duration, dt)
         self._clock = PhaseClock(profile.usual_gaps, duration, dt)
         self._ranges, self._start = ranges, np.where(np.arange(len(ranges)) < self._n_dof, np.nan, 0.0)
-        self._task, self._has_begun = task, False
+        self._task, self._has_started, self._has_begun = task, False, False
         self.goal = np.full(self._n_dof, np.nan)
         """(D,) array: displacement of the goal as a fraction of the range; NaN where it is not told, or the start was not seen
         by the first tick."""
@@ -29,7 +29,9 @@ class ExecutionTicks:
         """Take in a sample (S,), units of each signal; returns the ticks that are complete."""
         believed = self.sensors.believe(measured)
         # Displacements count from where the execution was first seen, not from where it was told to be; channels from zero.
-        self._start = np.where(np.isnan(self._start), believed, self._start)
+        if not self._has_started:
+            self._start = np.where(np.isnan(self._start), believed, self._start)
+            self._has_started = not np.isnan(self._start).any()
         ticks = self._clock.advance(time, (believed - self._start) / self._ranges)
         if ticks and not self._has_begun:
             d = self._n_dof

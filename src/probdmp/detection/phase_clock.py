@@ -58,6 +58,7 @@ class PhaseClock:
         self._longest_gaps, self._patience = longest_gaps(usual_gaps, np.asarray(self._rate), np.asarray(dt))
         self._last_times = np.full(len(usual_gaps), -np.inf)
         self._last_values = np.full(len(usual_gaps), np.nan)
+        self._everything = np.ones(len(usual_gaps))
         self._pending: list[Tick] = []
         self._next = 0
 
@@ -75,7 +76,7 @@ class PhaseClock:
             self._next += 1
         seen = ~np.isnan(values)
         if not self._pending and seen.all():  # between ticks: nothing to do but to remember
-            self._last_times, self._last_values = np.full(len(values), now), values
+            self._last_times, self._last_values = self._everything * now, values
             return []
         if self._pending and seen.any():
             self._fill(now, values, seen)

@@ -74,6 +74,7 @@ class SensorWatch:
         self._believed = (unknown, unknown)
         """The last sample but one, and the last."""
         self._is_calm = False
+        self._state: tuple[str, bool] | None = None
         self._suspicious, self._last = unknown, unknown
         self._silent, self._skipped = np.zeros(shape), np.zeros(shape)
         self.repeats, self.spikes = np.zeros(shape), np.zeros(shape)
@@ -87,9 +88,16 @@ class SensorWatch:
         return np.where(is_stuck, CAUSES.index("stuck"), np.where(has_spikes, CAUSES.index("spikes"), 0))
 
     @property
+    def state(self) -> tuple[str, bool]:
+        """What is wrong with a single execution, in a word or two, or nothing; and whether a sensor is stale."""
+        if self._state is None:
+            self._state = CAUSES[int(self.causes)], bool(self.is_stale)
+        return self._state
+
+    @property
     def cause(self) -> str:
-        """What is wrong with a single execution, in a word or two; nothing if nothing is."""
-        return CAUSES[int(self.causes)]
+        """The first of these."""
+        return self.state[0]
 
     @property
     def _all_repeat(self) -> BoolArray:
@@ -126,13 +134,14 @@ class SensorWatch:
         """The sample (*batch, S) without what is suspicious of it, which is NaN instead; units of each signal."""
         older, old = self._believed
         jumps = np.abs(measured - old - (self._skipped + 1) * (old - older))
-        if self._is_calm and np.all(jumps <= self._largest_jumps) and not np.any(measured == self._last):
+        if self._is_calm and (jumps <= self._largest_jumps).all() and not (measured == self._last).any():
             self._believed, self._last = (old, measured), measured
             return measured
         return self._look(measured, jumps)
 
     def _look(self, measured: FloatArray, jumps: FloatArray) -> FloatArray:
         """The same where something may be missing, wild or repeated."""
+        self._state = None
         older, old = self._believed
         seen = ~np.isnan(measured)
         self._silent = np.where(seen, 0, self._silent + 1)

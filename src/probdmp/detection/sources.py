@@ -99,7 +99,7 @@ class InnovationSource:
     def nis(self, observed: Observed) -> float:
         """Mean normalised innovation squared."""
         self.recent.append(_mean_square(observed))
-        return float(np.mean(self.recent))
+        return sum(self.recent) / len(self.recent)
 
     def cusum(self, observed: Observed) -> float:
         """Page's cumulative sum."""
@@ -122,4 +122,6 @@ def signed_squares(observed: Observed) -> FloatArray:
 
 
 def _mean_square(observed: Observed) -> float:
-    return float(np.nanmean(observed.innovations**2 / observed.innovation_variances))
+    squares = observed.innovations**2 / observed.innovation_variances
+    seen = ~np.isnan(squares)
+    return float(squares.sum(where=seen) / seen.sum())

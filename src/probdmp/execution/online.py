@@ -118,9 +118,8 @@ class OnlineExecution:
         self._monitor: Monitor | None = None
         if self._detector is not None:
             self._monitor = self._detector.monitor(self.primitive, self.task, self.dt, self.array.outputs)
-        # Where nobody else needs the reading, it need not be copied and checked before it is filtered.
-        is_alone = self._monitor is None and self._modulating is None
-        self._direct = self._filter if is_alone and isinstance(self._filter, PlainFilter) else None
+        self._plain = self._filter if isinstance(self._filter, PlainFilter) else None
+        self._is_alone = self._monitor is None and self._modulating is None
         self._step, self._clock_offset, self.n_dropped, self._n_late = 0, 0.0, 0, 0
         self._counts, self._n_counted = {name: SensorCounts() for name in self.array.names}, 0
         self._held: FloatArray | None = None
@@ -160,10 +159,10 @@ class OnlineExecution:
             outputs. NaN: not measured; None: nothing was.
         time : seconds since the start at which it was measured; the next tick unless given.
         """
-        if time is None and self._direct is not None:
-            seen = self._direct.take(observation)
+        if time is None and self._plain is not None:  # which looks at it by itself
+            seen = self._plain.take(observation)
             if seen is not None:
-                return self._reached(seen, seen)
+                return self._reached(seen, seen) if self._is_alone else self._judged(np.array(observation), seen)
         measured = observation_of(self.array, observation)
         if time is not None:
             due = self._tick_of(check_number(time, "time as a number of seconds"))
@@ -186,8 +185,11 @@ class OnlineExecution:
 
     def _advance(self, measured: FloatArray) -> ExecutionStep:
         """One tick: update with what is measured (Alg. 2, lines 5-8), predict the next state (lines 3-4)."""
-        seen = commanded = self._filter.step(measured)
-        test_ratio, verdict, held = math.nan, None, None
+        return self._judged(measured, self._filter.step(measured))
+
+    def _judged(self, measured: FloatArray, seen: SensedTick) -> ExecutionStep:
+        """What becomes of a tick that was filtered; what is measured is the monitor's to keep."""
+        commanded, test_ratio, verdict, held = seen, math.nan, None, None
         if self._monitor is not None:
             test_ratio = self._monitor.update(self._observed(measured, seen))
             verdict = self._monitor.verdict
