@@ -11,7 +11,7 @@ from peers.system import Stepper, System, systems_of
 from probdmp import ProbabilisticDMP
 from probdmp.checks import FloatArray
 from probdmp.execution import SensorArray
-from probdmp.execution.step_filters import step_filter
+from probdmp.execution.step_filters import PlainFilter, step_filter
 from realtime import tended
 from speed.agreement import Agreement, imported
 from speed.interleaving import Clocked, clocked
@@ -37,23 +37,26 @@ def our_stepper(movement: str, uncertainty: str = "independent", n_steps: int = 
 
 
 def filter_stepper(movement: str) -> Callable[[FloatArray], Any]:
-    """The same without what `step` does beside filtering: reading, clock, result."""
+    """The same without what `step` does beside filtering: a tick with its log-likelihood is all that comes of it."""
     dmp, _ = learned(movement)
     primitive, task = dmp.primitive_, task_of(dmp)
     dt = float(task.duration) / (N_STEPS - 1)
-    return step_filter(primitive, task, dt, N_STEPS, SensorArray(primitive)).step
+    filtering = step_filter(primitive, task, dt, N_STEPS, SensorArray(primitive))
+    assert isinstance(filtering, PlainFilter), "its sensors are those of the paper"
+    return filtering.take
 
 
 def stepped(begin: Callable[[], Callable[[FloatArray], object]], observations: FloatArray) -> Clocked:
-    """Whole executions of observations (T, D), without what it takes to begin them; seconds of a tick."""
+    """Whole executions of observations (T, D), without what it takes to begin them and to take these apart; seconds of a tick."""
+    readings = list(observations)
 
     def run(count: int) -> float:
         total = 0.0
         for _ in range(count):
             step = begin()
             began = time.perf_counter()
-            for observation in observations:
-                step(observation)
+            for reading in readings:
+                step(reading)
             total += time.perf_counter() - began
         return total
 

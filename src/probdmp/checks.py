@@ -111,9 +111,12 @@ def check_array(
 
 def is_plain(array: object) -> TypeGuard[FloatArray]:
     """Whether kernels take it as it is; they look at its values themselves, which takes long for many, and for few."""
-    # The numbers of other kinds of arrays, masked ones, are not what they say.
-    is_array = isinstance(array, np.ndarray) and type(array) in (np.ndarray, np.memmap)
-    return is_array and array.dtype == np.float64 and array.flags.c_contiguous
+    if not isinstance(array, np.ndarray) or type(array) not in (
+        np.ndarray,
+        np.memmap,
+    ):  # of a masked one, not all numbers count
+        return False
+    return array.dtype == np.float64 and array.flags.c_contiguous
 
 
 def freeze_arrays(value: object) -> None:

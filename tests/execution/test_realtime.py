@@ -102,6 +102,16 @@ def test_the_buffer_of_a_reading_may_be_used_again(learned, letters):
             np.testing.assert_equal(one.test_ratio, other.test_ratio)
 
 
+def test_what_is_masked_was_not_measured(learned):
+    readings = readings_of(learned, 0.01)
+    masked, missing = learned.execute(dt=0.01), learned.execute(dt=0.01)
+    for t, reading in enumerate(readings[:20]):
+        gone = reading.copy()
+        gone[1] = np.nan if t % 3 else gone[1]
+        one = masked.step(np.ma.masked_array(reading, [False, bool(t % 3)]))
+        np.testing.assert_array_equal(one.position, missing.step(gone).position)
+
+
 @pytest.mark.parametrize("value", [np.inf, -np.inf, 1e150])
 def test_a_refused_reading_changes_nothing(learned, value):
     readings = readings_of(learned, 0.01)

@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -190,7 +191,7 @@ def test_steps_that_were_not_prepared_are_refused():
         (inputs, system, 2),
         (system[:, :7], inputs, 2),
     ):
-        with pytest.raises(ValueError, match="expected|contiguous"):
+        with pytest.raises(ValueError, match=r"expected|contiguous"):
             made(*arguments)
     for arguments in ((), (system, inputs), (system, None, 2), (system, inputs, 2.5)):
         with pytest.raises(TypeError):
@@ -319,6 +320,46 @@ def test_evidence_is_a_difference_of_densities_where_it_is_above_its_floor(argum
         found = squares.copy()
         module.window_evidence(*arguments, scales, n_halves, constants, floors, found, 4.0, int(rng.integers(which.shape[1])))
         np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-11)
+
+
+@given(windows(), seeds)
+def test_sums_of_one_window_are_those_of_its_outputs(arguments, seed):
+    values, rows, maps, which, ends, reach, _ = arguments
+    ends = np.append(np.random.default_rng(seed).integers(0, ends[0]), ends)
+    window, reached = values[rows[0], 0], int(reach[ends[-1] - 1])
+    squares = (maps[which[0]] @ window) ** 2
+    expected = [squares[:, begin:end].sum(axis=1) for begin, end in pairwise(ends)]
+    for module in {_kernels_numpy, _compiled() if kernels.COMPILED else _kernels_numpy}:
+        sums = np.full((len(ends) - 1, which.shape[1]), -7.0)
+        module.window_sums(maps, which[0], reach, window[:reached].copy(), ends, sums)
+        assert_same(sums, np.array(expected))
+
+
+@needs_extension
+@pytest.mark.parametrize(
+    ("position", "wrong"),
+    [
+        (1, np.array([0, 2])),
+        (1, np.array([-1, 0])),
+        (2, np.array([1, 3])),
+        (2, np.array([-1, 2])),
+        (2, np.array([1, 2, 2])),
+        (3, np.ones(1)),
+        (3, np.ones(3)),
+        (4, np.array([0, 3])),
+        (4, np.array([-1, 2])),
+        (4, np.array([1, 1])),
+        (4, np.zeros(0, dtype=np.int64)),
+        (5, np.zeros((1, 3))),
+        (5, np.zeros((2, 2))),
+    ],
+)
+def test_windows_that_do_not_fit_their_maps_are_refused(position, wrong):
+    arguments = [np.ones((2, 2, 2)), np.array([0, 1]), np.array([1, 2]), np.ones(2), np.array([0, 2]), np.zeros((1, 2))]
+    _compiled().window_sums(*arguments)
+    arguments[position] = wrong
+    with pytest.raises(ValueError, match=r"expected|belong together"):
+        _compiled().window_sums(*arguments)
 
 
 @needs_extension

@@ -119,7 +119,7 @@ class Foreseen:
 
 
 class Looks(NamedTuple):
-    """What is computed before to look at single executions fast: H windows at each of T ticks, each longer than the one before."""
+    """What is computed before to look at single executions fast: H windows at each of T ticks, each longer than the last."""
 
     maps: WindowMaps
     places: list[list[int]]
@@ -145,9 +145,10 @@ class Looks(NamedTuple):
         squares /= DEGREES_OF_FREEDOM
         squares += 1
         squares *= bases
-        least = squares.min(axis=-1)
-        mixed = ((least[..., None] / squares) ** powers[..., None]).sum(axis=-1)
-        return np.asarray(np.log(mixed) - powers * np.log(least))
+        least = np.minimum.reduce(squares, axis=-1)
+        np.divide(least[..., None], squares, out=squares)
+        squares **= powers[..., None]
+        return np.asarray(np.log(np.add.reduce(squares, axis=-1)) - powers * np.log(least))
 
     def _squares(self, h: int, place: int, window: FloatArray, known: dict[int, FloatArray]) -> FloatArray:
         """Squared distances of the first points and of all of window h, (2, A) array.
@@ -157,7 +158,9 @@ class Looks(NamedTuple):
         begun = known.pop(place, None)
         if begun is None:
             sums = self.maps.look(place, window, self.ends[: h + 3])
-            begun = np.stack([sums[0], sums.sum(axis=0)])
+            begun = sums[:2]
+            for later in (sums[0], *sums[2:]):
+                begun[1] += later
         else:
             begun[1] += self.maps.look(place, window, self.ends[h + 1 : h + 3])[0]
         if h + 1 < len(self.powers):

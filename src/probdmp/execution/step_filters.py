@@ -58,7 +58,7 @@ class PlainFilter:
         return taken
 
     def take(self, observation: object) -> RecordedTick | None:
-        """The same of what was not checked: None, and nothing is done, unless it is a plain array that can be an observation."""
+        """The same of what was not checked: None, and nothing is done, unless it is an array that can be an observation."""
         if self._k == self._n_prepared:
             self._first += self._k
             self._load(LATER_CHUNK)

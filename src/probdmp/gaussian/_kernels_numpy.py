@@ -103,9 +103,9 @@ class PreparedSteps:
 
         Returns
         -------
-        How many of D outputs were observed, D, their log-likelihood, and a record, a float64 array (n + n n + 3, W) as bytes: m and V of
-        the next tick, then innovation, its variance S and log-likelihood of each output at this one. None if the observation
-        is not what can be taken, or one of its numbers is infinite or too large to be squared.
+        How many of D outputs were observed, D, their log-likelihood, and a record, a float64 array (n + n n + 3, W) as bytes:
+        m and V of the next tick, then innovation, its variance S and log-likelihood of each output at this one. None if the
+        observation is not what can be taken, or one of its numbers is infinite or too large to be squared.
         """
         if not is_plain(observation) or observation.shape != (self._n_outputs,):
             return None
