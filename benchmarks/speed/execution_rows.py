@@ -47,7 +47,7 @@ def filter_stepper(movement: str) -> Callable[[FloatArray], Any]:
 
 
 def stepped(begin: Callable[[], Callable[[FloatArray], object]], observations: FloatArray) -> Clocked:
-    """Whole executions of observations (T, D), without what it takes to begin them and to take these apart; seconds of a tick."""
+    """Whole executions of observations (T, D), without beginning them and taking these apart; seconds of a tick."""
     readings = list(observations)
 
     def run(count: int) -> float:

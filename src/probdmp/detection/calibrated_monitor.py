@@ -53,10 +53,9 @@ class CalibratedMonitor:
         self._ratio = max(ratios, default=self._ratio)
         sensors = self._source.sensors
         if sensors is not None:
-            cause, is_stale = sensors.state
-            if cause and not self._verdict.has_sensor_fault:
+            if sensors.cause and not self._verdict.has_sensor_fault:
                 self._note_sensor(observed, sensors)
-            if is_stale != self._verdict.is_stale:
+            if bool(sensors.is_stale) != self._verdict.is_stale:
                 self._note_silence(observed, sensors)
         return self._ratio
 

@@ -74,7 +74,9 @@ class SensorWatch:
         self._believed = (unknown, unknown)
         """The last sample but one, and the last."""
         self._is_calm = False
-        self._state: tuple[str, bool] | None = None
+        self._causes: IntArray | None = None
+        self._is_stale: BoolArray | None = None
+        """What has been asked since anything was missing, wild or repeated: while nothing is, neither changes."""
         self._suspicious, self._last = unknown, unknown
         self._silent, self._skipped = np.zeros(shape), np.zeros(shape)
         self.repeats, self.spikes = np.zeros(shape), np.zeros(shape)
@@ -82,22 +84,17 @@ class SensorWatch:
     @property
     def causes(self) -> IntArray:
         """(*batch) array: which of `CAUSES` applies."""
-        # If nothing moves at all, whether by exact numbers or not, it is the movement that stands still.
-        is_stuck = np.any(self.repeats > self._most_repeats, axis=-1) & ~self._all_repeat
-        has_spikes = self.spikes.sum(axis=-1) > MOST_SPIKES
-        return np.where(is_stuck, CAUSES.index("stuck"), np.where(has_spikes, CAUSES.index("spikes"), 0))
-
-    @property
-    def state(self) -> tuple[str, bool]:
-        """What is wrong with a single execution, in a word or two, or nothing; and whether a sensor is stale."""
-        if self._state is None:
-            self._state = CAUSES[int(self.causes)], bool(self.is_stale)
-        return self._state
+        if self._causes is None:
+            # If nothing moves at all, whether by exact numbers or not, it is the movement that stands still.
+            is_stuck = np.any(self.repeats > self._most_repeats, axis=-1) & ~self._all_repeat
+            has_spikes = self.spikes.sum(axis=-1) > MOST_SPIKES
+            self._causes = np.where(is_stuck, CAUSES.index("stuck"), np.where(has_spikes, CAUSES.index("spikes"), 0))
+        return self._causes
 
     @property
     def cause(self) -> str:
-        """The first of these."""
-        return self.state[0]
+        """What is wrong with a single execution, in a word or two; nothing if nothing is."""
+        return CAUSES[int(self.causes)]
 
     @property
     def _all_repeat(self) -> BoolArray:
@@ -107,7 +104,9 @@ class SensorWatch:
     @property
     def is_stale(self) -> BoolArray:
         """(*batch) array: whether a sensor has been silent for too long."""
-        return np.asarray(self.staleness > 1)
+        if self._is_stale is None:
+            self._is_stale = np.asarray(self.staleness > 1)
+        return self._is_stale
 
     @property
     def shares(self) -> FloatArray:
@@ -141,7 +140,7 @@ class SensorWatch:
 
     def _look(self, measured: FloatArray, jumps: FloatArray) -> FloatArray:
         """The same where something may be missing, wild or repeated."""
-        self._state = None
+        self._causes = self._is_stale = None
         older, old = self._believed
         seen = ~np.isnan(measured)
         self._silent = np.where(seen, 0, self._silent + 1)
