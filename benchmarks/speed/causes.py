@@ -21,7 +21,9 @@ CAUSES = {
         "989 unknowns are conditioned on 30 readings at each tick; the gains of a movement of so many ticks "
         "are more than are prepared (`LARGEST_SCHEDULE` in execution/joint_steps.py)"
     ),
-    "online step, 30 degrees of freedom, `independent`": ("not profiled; it is near: in two other runs the median was 3.8 and 5.0 µs"),
+    "online step, 30 degrees of freedom, `independent`": (
+        "not profiled; it is near: in two other runs the median was 3.8 and 5.0 µs"
+    ),
     "rollout": (
         "most of it is not the recursion but the model, its checks, and the covariances of all states, which "
         "the others do not give"
