@@ -34,8 +34,8 @@ LOG_2PI = float(np.log(2 * np.pi))
 BLOCK = 2048
 """Series that are filtered side by side: what is known of them stays in the cache."""
 GROUP = 128
-"""Series of one product of matrices, padded to it: so many that it is fast, so few that it is not split among threads, and always
-as many, so that each is rounded alike whatever it is beside."""
+"""Series of one product of matrices, padded to it: many, to be fast, but few enough for BLAS not to split it among threads, and
+always as many, so that each is rounded alike whatever it is beside."""
 STEPS = 32
 """Steps that are taken at once, as one product of matrices: many cost arithmetic, few cost calls."""
 
