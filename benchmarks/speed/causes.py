@@ -4,15 +4,28 @@ __all__ = ["CAUSES"]
 
 CAUSES = {
     "batch score against": (
-        "not profiled; probably, recordings come from memory here, since others have taken their turn in between; "
-        "bringing eight of "
-        "them side by side then costs more than filtering them"
+        "of 100 series, leaving out one or the other, the recursion takes 0.52 ns, which is all the multiplications that the "
+        "processor can do (20 vector operations for 8 series, two in a cycle), and bringing eight series side by side 0.39 ns; "
+        "of 10,000, recordings come from memory while those before them are filtered"
     ),
-    "NumPy twin against dynamax": ("each step is ten passes over arrays of 2,048 recordings, every one of them a call"),
-    "one series": ("not profiled in this run; probably, much of the call is Python: shapes, and the array of the result"),
-    "smoother against dynamax": ("three states of each sample are written, to memory that is new at every call"),
+    "NumPy twin against dynamax": (
+        "32 steps are one product of matrices, which takes 2.9 ns for 72 operations a step where the recursion has 20; to take "
+        "readings less their path out of their rows takes 1.6 ns, to square and add 0.4 ns, and the rest is memory"
+    ),
+    "one series": (
+        "of 5.3 µs, 2.1 µs are the kernel, of which 0.85 µs are its seven arrays (the same call of no series); the rest is "
+        "Python: checks, shapes, and the array of the result"
+    ),
+    "smoother against dynamax": (
+        "three states of each sample are written, to memory that is new at every call: "
+        "`numpy.empty((10_000, 200, 1, 3)).fill(1.0)` alone takes 5.4 ns per series and step, the smoother 7.6 ns, and 5.5 ns "
+        "into memory that is there already"
+    ),
     "batch from memory": ("recordings are brought side by side before they are filtered"),
-    "two threads": ("not profiled; both cores read from one memory"),
+    "two threads": (
+        "one thread takes 1.3 times as long as merely reading the recordings, and both cores read from one memory: see the two "
+        "rows above"
+    ),
     "online step, 7 degrees": (
         "the target is that of a kernel with everything in place; here it is the public `step()`, half of which is "
         "Python around the filter: the call, the tick, the result"

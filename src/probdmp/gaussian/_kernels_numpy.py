@@ -38,6 +38,9 @@ __all__ = [
 LOG_2PI = float(np.log(2 * np.pi))
 BLOCK = 2048
 """Series that are filtered side by side: what is known of them stays in the cache."""
+GROUP = 128
+"""Series of one product of matrices, padded to it: many, to be fast, but few enough for BLAS not to split it among threads, and
+always as many, so that each is rounded alike whatever it is beside."""
 STEPS = 32
 """Steps that are taken at once, as one product of matrices: many cost arithmetic, few cost calls."""
 
@@ -153,15 +156,18 @@ def squared_innovations(
         for block in _parts(len(observations), max(1, BLOCK // n_dof)):
             observed = np.moveaxis(observations[block], -1, 0)
             expected = np.moveaxis(paths if len(paths) == 1 else paths[block], -1, 0)
-            total = np.zeros(observed.shape[:2])
+            k, groups = observed.shape[1], -(-observed.shape[1] // GROUP)
+            total = np.zeros((n_dof, groups, GROUP))
             before = np.zeros((*total.shape, n + STEPS))  # states, and what is observed from there on
+            one_by_one = before.reshape(n_dof, -1, n + STEPS)[:, :k]
             for times, response in zip(_parts(n_times, STEPS), responses, strict=True):
                 used = n + times.stop - times.start
-                np.subtract(observed[..., times], expected[..., times], out=before[..., n:used])
-                after = response[:, :used, :used] @ before[..., :used].mT
-                before[..., :n] = after[:, :n].mT
-                total += np.einsum("dtk,dtk->dk", after[:, n:], after[:, n:])
-            squares[block] = total.T
+                np.subtract(observed[..., times], expected[..., times], out=one_by_one[..., n:used])
+                after = response[:, None, :used, :used] @ before[..., :used].mT
+                before[..., :n] = after[..., :n, :].mT
+                after = after[..., n:, :]
+                total += np.einsum("dgtk,dgtk->dgk", after, after)
+            squares[block] = total.reshape(n_dof, -1)[:, :k].T
 
 
 def smoothed_states(
