@@ -23,15 +23,16 @@ CAUSES = {
     ),
     "online step, 30 degrees of freedom, `independent`": ("as with 7 degrees of freedom, most of it is Python"),
     "rollout": (
-        "most of it is not the recursion but the model, its checks, and the covariances of all states, which "
-        "the others do not give"
+        "by profile, half of it with independent weights and a third with joint ones are the checks of what was asked; the "
+        "path is one product of matrices, and covariances are kept from the first rollout of that duration"
     ),
     "fit, one demonstration": (
         "more is learned: a prior, the noise of sensors and of the forcing term by their likelihood, and how "
-        "certain all of it is; movement_primitives solves for the weights"
+        "certain all of it is; movement_primitives solves for the weights. By profile, most of it with independent and joint "
+        "weights are ten E steps, each of which solves for 224 unknowns of 7 degrees of freedom that vary together"
     ),
     "`from probdmp import": (
-        "some two hundred modules of the library are loaded "
+        "some fifty modules are loaded, and a third of the time makes their frozen dataclasses "
         "(`python -X importtime -c 'from probdmp import ProbabilisticDMP'`); where "
         "bytecode is not kept (PYTHONDONTWRITEBYTECODE) they are compiled at every start, too"
     ),
