@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -108,10 +109,10 @@ def execution_rows(settings: Settings) -> Iterator[Row]:
 
 
 def rollout_rows(settings: Settings) -> Iterator[Row]:
-    """Rolling out 200 samples of 7 degrees of freedom; only this library's have an uncertainty."""
+    """Rolling out 200 samples of 7 degrees of freedom, to a new goal each time; only this library's have an uncertainty."""
     demonstration = learned("arm")[1][0]
     contestants: dict[str, Clocked | None] = {
-        f"probdmp, {uncertainty}": clocked(learned("arm", uncertainty)[0].rollout) for uncertainty in UNCERTAINTIES
+        f"probdmp, {uncertainty}": clocked(_to_new_goals(learned("arm", uncertainty)[0])) for uncertainty in UNCERTAINTIES
     }
     errors = []
     for name in ("movement_primitives", "pydmps"):
@@ -134,6 +135,13 @@ def peer_stepped(name: str, systems: list[System], observations: FloatArray) -> 
     """A package's filter of independent systems, tick by tick; None if it is not installed."""
     module = imported(name)
     return None if module is None else stepped(lambda: module.stepper(systems).step, observations)
+
+
+def _to_new_goals(dmp: ProbabilisticDMP) -> Callable[[], object]:
+    """Rollouts of the learned duration and step, of which what does not depend on the goal is kept after the first."""
+    primitive, rng = dmp.primitive_, np.random.default_rng(0)
+    goals = cycle(primitive.goal + 0.1 * primitive.ranges * rng.standard_normal((100, primitive.n_dof)))
+    return lambda: dmp.rollout(goal=next(goals))
 
 
 def _each_tick(uncertainty: str) -> FloatArray:

@@ -87,10 +87,9 @@ def check_array(
     if raw.dtype.kind not in "fiu":
         raise InputTypeError(f"{name} as real numbers", f"dtype {raw.dtype}", "Convert it with numpy.asarray(..., float).")
     array = np.ascontiguousarray(raw, dtype=np.float64).reshape(raw.shape)
-    wanted = shape_text(shape)
     actual: tuple[int, ...] = array.shape
     if len(actual) != len(shape) or any(isinstance(n, int) and n != m for n, m in zip(shape, actual, strict=True)):
-        raise InputError(f"{name} of shape {wanted}", shape_text(actual), hint)
+        raise InputError(f"{name} of shape {shape_text(shape)}", shape_text(actual), hint)
     if np.abs(array).max(initial=0.0) <= LARGEST_MAGNITUDE:  # NaN is not
         return array
     bad = ~np.isfinite(array)

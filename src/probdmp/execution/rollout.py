@@ -11,10 +11,10 @@ from probdmp.dmp.joint_model import joint_executions
 from probdmp.dmp.transformation_system import POSITION
 from probdmp.execution.joint_filtering import joint_position_covariances, sample_joint
 from probdmp.execution.readings import recording_of_readings
-from probdmp.execution.rollout_plans import roll_out_independent, roll_out_joint
+from probdmp.execution.rollout_plans import roll_out_joint
 from probdmp.execution.sensor_array import SensorArray
 from probdmp.execution.trajectory import GaussianTrajectory, channels_of
-from probdmp.gaussian import GaussianSequence, sample_sequences
+from probdmp.gaussian import GaussianSequence, filter_sequence, sample_sequences
 
 __all__ = ["position_covariances", "roll_out", "sample_recordings", "sample_states", "sample_trajectories", "trajectory_parts"]
 
@@ -32,7 +32,7 @@ def roll_out(primitive: Primitive, task: Task, dt: float) -> GaussianTrajectory:
     if primitive.configuration.weight_uncertainty == "joint":
         rolled = roll_out_joint(primitive, tasks, dt, joint_executions(primitive, tasks, np.array([dt]), n_steps))
     else:
-        rolled = roll_out_independent(primitive, tasks, dt, n_steps)
+        rolled = filter_sequence(linear_gaussian_model(primitive, tasks, np.array([dt]), n_steps)).filtered
     return GaussianTrajectory(**trajectory_parts(primitive, times, rolled))
 
 
