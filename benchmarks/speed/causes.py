@@ -42,8 +42,8 @@ CAUSES = {
         "the others do not give"
     ),
     "rollout 200 × 7, `joint`": (
-        "by profile, a third of it is checking what was asked, another what a goal tells of the weights; the path is one product "
-        "of matrices, and covariances are kept from the first rollout of that duration"
+        "by profile, a third of it is the checks of what was asked; the path is one product of matrices, and covariances are "
+        "kept from the first rollout of that duration"
     ),
     "fit, one demonstration": (
         "more is learned: a prior, the noise of sensors and of the forcing term by their likelihood, and how "
