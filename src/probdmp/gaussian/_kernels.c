@@ -110,7 +110,7 @@ static int few_states(Py_ssize_t n)
     case 4: BODY(4); break;                                                                                                   \
     }
 
-/* A line of the cache, or of nothing. */
+/* Begins to bring a line into the cache; where there is no memory nothing happens. */
 #if defined(__GNUC__)
 #define fetch(address) __builtin_prefetch(address)
 #else
