@@ -20,7 +20,7 @@ from probdmp.gaussian import AffineObservation, Linearization, linearize_extende
 
 __all__ = ["Moments", "SensorArray"]
 
-Values = TypeVar("Values", FloatArray, BoolArray)
+Values = TypeVar("Values", FloatArray, BoolArray, IntArray)
 Moments = Callable[[], tuple[FloatArray, FloatArray]]
 """Mean (*batch, 3 S) and covariance (*batch, 3 S, 3 S) of the states of all signals, computed when they are needed."""
 

@@ -15,6 +15,7 @@ __all__ = [
     "COMPILED",
     "LANE",
     "MOST_STATES",
+    "augmented_step",
     "filter_step",
     "filter_systems",
     "in_threads",
@@ -60,6 +61,7 @@ window_mixtures: Callable[..., None] = _kernels.window_mixtures
 window_evidence: Callable[..., None] = _kernels.window_evidence
 plain_recordings: Callable[..., None] = _kernels.plain_recordings
 points_on_lines: Callable[..., None] = _kernels.points_on_lines
+augmented_step: Callable[..., None] = _kernels.augmented_step
 split_sums = _kernels_numpy.split_sums
 
 
