@@ -88,7 +88,12 @@ class JointFilter:
 
 
 def _tick(seen: AugmentedTick, array: SensorArray) -> Tick:
-    innovations, fused = array.flat(seen.innovations), array.flat(seen.fused) == 1
-    covariance = array.flat_covariances(seen.innovation_covariance)
-    moments = seen.states.reshape(-1, 3), seen.state_covariances
-    return Tick(int(fused.sum()), *moments, array.flat(seen.log_likelihoods), innovations, covariance, fused)
+    return Tick(
+        seen.n_fused,
+        seen.states.reshape(-1, 3),
+        seen.state_covariances,
+        array.flat(seen.log_likelihoods),
+        array.flat(seen.innovations),
+        array.flat_covariances(seen.innovation_covariance),
+        array.flat(seen.fused) != 0,
+    )

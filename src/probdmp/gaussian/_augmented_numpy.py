@@ -39,7 +39,7 @@ def augmented_step(
     fused: IntArray,
     gains: FloatArray,
     deviation_gains: FloatArray,
-) -> None:
+) -> int:
     """Update with what was observed, then predict, for G groups of n states and S outputs, each of which has W of the z.
 
     Parameters
@@ -56,6 +56,10 @@ def augmented_step(
     log_likelihoods, fused : written, (G S) arrays.
     gains : written, of z, (G S, G W), or (0, G W) where nobody asks.
     deviation_gains : written, of the deviations given z at this tick, (G, n, S).
+
+    Returns
+    -------
+    How many outputs were seen and believed.
     """
     (n_groups, n_states, width), n_latent = designs.shape, len(mean)
 
@@ -84,3 +88,4 @@ def augmented_step(
     n_blocks, b = len(blocks) // n_groups, blocks.shape[1]
     left = ahead.covariance.reshape(n_groups, n_blocks, b, n_blocks, b)[:, np.arange(n_blocks), :, np.arange(n_blocks)]
     state_covariances[:] = (shown + shown.mT) / 2 + left.swapaxes(0, 1).reshape(-1, b, b)
+    return int(seen.fused.sum())

@@ -228,7 +228,8 @@ typedef struct {
 #define no_sum NAMED(no_sum)
 #define dot NAMED(dot)
 #define add_multiple NAMED(add_multiple)
-#define dot_and_add NAMED(dot_and_add)
+#define sum_of NAMED(sum_of)
+#define both_ways NAMED(both_ways)
 #define multiply NAMED(multiply)
 #define multiply_transposed NAMED(multiply_transposed)
 #define triangle_times NAMED(triangle_times)
@@ -635,6 +636,7 @@ static PyObject *augmented_step(PyObject *module, PyObject *const *arguments, Py
         {r}, {r, r}, {g, n}, {g, n, w}, {g, n, n}, {r}, {r, r}, {g, n}, {g, n, w}, {g, n, n}, {g, n},
         {b > 0 ? g * n / b : 0, b, b}, {q}, {q, q}, {q}, {q}, {n_gains ? q : 0, r}, {g, n, size},
     };
+    Py_ssize_t n_fused = 0;
     int done = 1;
     for (int i = 0; done && i < COUNT; i++)
         done = agree(&x[i], specs[i].name, wanted[i][0], wanted[i][1], wanted[i][2], wanted[i][3]);
@@ -661,11 +663,11 @@ static PyObject *augmented_step(PyObject *module, PyObject *const *arguments, Py
             PyErr_SetString(PyExc_ValueError, "expected innovations with a positive definite covariance");
             done = 0;
         }
+        for (Py_ssize_t o = 0; done && o < q; o++) n_fused += s.fused[o] != 0;
         free(work);
     }
     release(x, COUNT);
-    if (!done) return NULL;
-    Py_RETURN_NONE;
+    return done ? PyLong_FromSsize_t(n_fused) : NULL;
 }
 
 /* ---- The module --------------------------------------------------------------------------------------------------------- */
@@ -1377,14 +1379,22 @@ INLINE Lane no_sum(void)
     return load(none);
 }
 
+INLINE double sum_of(Lane x)
+{
+#ifdef MASK
+    const Vector both = x.part[0] + x.part[1];
+    return (both[0] + both[2]) + (both[1] + both[3]);
+#else
+    return (x.part[0] + x.part[2]) + (x.part[1] + x.part[3]);
+#endif
+}
+
 INLINE double dot(const double *x, const double *y, Py_ssize_t n)
 {
     Lane sums = no_sum();
-    double parts[WIDTH], total = 0;
     Py_ssize_t i = 0;
     for (; i + WIDTH <= n; i += WIDTH) sums = plus_product(sums, load(x + i), load(y + i));
-    store(parts, sums);
-    for (int w = 0; w < WIDTH; w++) total += parts[w];
+    double total = sum_of(sums);
     for (; i < n; i++) total += x[i] * y[i];
     return total;
 }
@@ -1397,24 +1407,35 @@ INLINE void add_multiple(double *to, double factor, const double *x, Py_ssize_t 
     for (; i < n; i++) to[i] += factor * x[i];
 }
 
-/* Both at once, for a row that is read once: gives row y. */
-INLINE double dot_and_add(const double *row, const double *y, double *to, double factor, Py_ssize_t n)
+/* Some rows of a symmetric matrix, which are read once: to += factors rows, and what is given are the sums rows y. */
+INLINE void both_ways(const double *rows, Py_ssize_t stride, Py_ssize_t n_rows, Py_ssize_t n, const double *y,
+                      const double *factors, double *to, double *sums)
 {
-    Lane sums = no_sum();
-    double parts[WIDTH], total = 0;
+    const Lane zero = no_sum();
+    Lane sum[ROWS] = {zero, zero, zero, zero};
+    const double *row[ROWS];
+    double factor[ROWS];
+    for (int k = 0; k < ROWS; k++) { /* those that are too many are the last once more, without weight */
+        row[k] = rows + (k < n_rows ? k : n_rows - 1) * stride;
+        factor[k] = k < n_rows ? factors[k] : 0;
+    }
     Py_ssize_t i = 0;
     for (; i + WIDTH <= n; i += WIDTH) {
-        const Lane some = load(row + i);
-        sums = plus_product(sums, some, load(y + i));
-        store(to + i, plus(load(to + i), factor, some));
+        const Lane other = load(y + i);
+        Lane more = load(to + i);
+        UNROLL for (int k = 0; k < ROWS; k++) {
+            const Lane some = load(row[k] + i);
+            sum[k] = plus_product(sum[k], some, other);
+            more = plus(more, factor[k], some);
+        }
+        store(to + i, more);
     }
-    store(parts, sums);
-    for (int w = 0; w < WIDTH; w++) total += parts[w];
-    for (; i < n; i++) {
-        total += row[i] * y[i];
-        to[i] += factor * row[i];
-    }
-    return total;
+    UNROLL for (int k = 0; k < ROWS; k++) sums[k] = sum_of(sum[k]);
+    for (; i < n; i++)
+        for (int k = 0; k < ROWS; k++) {
+            sums[k] += row[k][i] * y[i];
+            to[i] += factor[k] * row[k][i];
+        }
 }
 
 /* product = a b, of (n, k) and (k, m). */
@@ -1438,12 +1459,22 @@ static void triangle_times(Py_ssize_t n, Py_ssize_t k, const double *p, Py_ssize
                            Py_ssize_t apart)
 {
     for (Py_ssize_t a = 0; a < k; a++) memset(product + a * apart, 0, n * sizeof(double));
-    for (Py_ssize_t i = 0; i < n; i++, p += stride)
+    for (Py_ssize_t i = 0; i < n; i += ROWS, p += ROWS * stride) {
+        const Py_ssize_t n_rows = n - i < ROWS ? n - i : ROWS;
         for (Py_ssize_t a = 0; a < k; a++) {
-            const double factor = x[a * n + i];
-            double *to = product + a * apart;
-            to[i] += dot_and_add(p, x + a * n, to, factor, i) + factor * p[i];
+            const double *factors = x + a * n + i;
+            double *to = product + a * apart, sums[ROWS];
+            both_ways(p, stride, n_rows, i, x + a * n, factors, to, sums);
+            for (Py_ssize_t j = 0; j < n_rows; j++) {
+                const double *corner = p + j * stride + i;
+                to[i + j] += sums[j] + factors[j] * corner[j];
+                for (Py_ssize_t l = 0; l < j; l++) {
+                    to[i + j] += factors[l] * corner[l];
+                    to[i + l] += factors[j] * corner[l];
+                }
+            }
         }
+    }
 }
 
 /* A = L L^T, in place; 0 if there is no such L. */
@@ -1503,11 +1534,16 @@ INLINE void spread_looks(const Augmented *s)
     for (Py_ssize_t g = 0; g < s->n_groups; g++) {
         const double *looks = s->looks + g * size * w, *own = s->covariance + g * w * (r + 1);
         triangle_times(w, size, own, r, looks, s->shown + g * size * r + g * w, r);
-        for (Py_ssize_t i = 0; i < w; i++) {
-            const double *row = s->covariance + (g * w + i) * r;
-            for (Py_ssize_t o = 0; o < g * size; o++)
-                s->shown[o * r + g * w + i] = dot(row + o / size * w, s->looks + o * w, w);
-            for (Py_ssize_t a = 0; a < size; a++) add_multiple(s->shown + (g * size + a) * r, looks[a * w + i], row, g * w);
+        for (Py_ssize_t i = 0; i < w; i += ROWS) {
+            const double *rows = s->covariance + (g * w + i) * r;
+            const Py_ssize_t n_rows = w - i < ROWS ? w - i : ROWS;
+            for (Py_ssize_t o = 0; o < g * size; o++) {
+                const Py_ssize_t first = o / size * w, a = o % size;
+                double sums[ROWS];
+                both_ways(rows + first, r, n_rows, w, s->looks + o * w, looks + a * w + i,
+                          s->shown + (g * size + a) * r + first, sums);
+                memcpy(s->shown + o * r + g * w + i, sums, n_rows * sizeof(double));
+            }
         }
     }
 }
@@ -1592,16 +1628,15 @@ INLINE void know_more(const Augmented *s)
                 const Lane some = load(column);
                 UNROLL for (int k = 0; k < ROWS; k++) sum[k] = plus(sum[k], row[k], some);
             }
-            for (Py_ssize_t k = 0; k < n_rows; k++) {
-                const double *from = s->covariance + (i + k) * r + j;
-                double *to = s->next_covariance + (i + k) * r + j, parts[WIDTH];
-                if (j + WIDTH <= r)
-                    store(to, plus(load(from), -1.0, sum[k]));
-                else {
-                    store(parts, sum[k]);
-                    for (Py_ssize_t w = 0; w < r - j; w++) to[w] = from[w] - parts[w];
-                }
+            const double *from = s->covariance + i * r + j;
+            double *to = s->next_covariance + i * r + j, parts[ROWS][WIDTH];
+            if (i + ROWS <= r && j + WIDTH <= r) {
+                UNROLL for (int k = 0; k < ROWS; k++) store(to + k * r, plus(load(from + k * r), -1.0, sum[k]));
+                continue;
             }
+            UNROLL for (int k = 0; k < ROWS; k++) store(parts[k], sum[k]);
+            for (Py_ssize_t k = 0; k < n_rows; k++)
+                for (Py_ssize_t w = 0; w < WIDTH && j + w < r; w++) to[k * r + w] = from[k * r + w] - parts[k][w];
         }
     }
 }

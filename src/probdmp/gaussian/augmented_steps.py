@@ -6,6 +6,7 @@ then takes W columns of z, not all G W; only what is known of z, its covariance,
     s_g[t] = path_g[t] + designs_g[t] z_g + d_g[t],    o_g[t] = C_g s_g[t] + v_g[t],  v_g ~ N(0, R_g)
 """
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -50,6 +51,8 @@ class Moves(NamedTuple):
 class AugmentedTick(NamedTuple):
     """What an observation has shown, Q = G S outputs of all groups, and the states at the next tick."""
 
+    n_fused: int
+    """Outputs that were seen and believed."""
     states: FloatArray
     """(G, n) array."""
     state_covariances: FloatArray
@@ -97,22 +100,31 @@ def augmented_tick(
     """
     (values, sensors, noise, believed), ((mean, covariance), deviation) = observed, state
     (n_groups, size), r = values.shape, len(mean)
-    q, trusted = n_groups * size, np.ones(values.shape, dtype=np.int64) if believed is True else believed.astype(np.int64)
-    known = AugmentedState(Belief(np.empty(r), np.empty((r, r))), Deviation(*(np.empty(part.shape) for part in deviation)))
-    tick = AugmentedTick(
-        np.empty(now.path.shape),
-        np.empty((now.path.size // BLOCK, BLOCK, BLOCK)),
-        np.empty(q),
-        np.empty((q, q)),
-        np.empty(q),
-        np.empty(q, dtype=np.int64),
-        np.empty((q if with_gains else 0, r)),
-        np.empty((n_groups, now.path.shape[1], size)),
+    q, n_states, empty = n_groups * size, now.path.shape[1], np.empty
+    trusted = _all(values.shape) if believed is True else np.asarray(believed, dtype=np.int64)
+    next_mean, next_covariance, deviation_ahead = empty(r), empty((r, r)), Deviation(*map(np.empty_like, deviation))
+    found = (
+        empty(now.path.shape),
+        empty((n_groups * n_states // BLOCK, BLOCK, BLOCK)),
+        empty(q),
+        empty((q, q)),
+        empty(q),
+        empty(q, dtype=np.int64),
+        empty((q if with_gains else 0, r)),
+        empty((n_groups, n_states, size)),
     )
-    kernels.augmented_step(
-        values, trusted, *now, *ahead, sensors, noise, *moves, mean, covariance, *deviation, *known.belief, *known.deviation, *tick
-    )
-    return known, tick
+    n_fused = kernels.augmented_step(
+        values, trusted, *now, *ahead, sensors, noise, *moves, mean, covariance, *deviation,
+        next_mean, next_covariance, *deviation_ahead, *found,
+    )  # fmt: skip
+    return AugmentedState(Belief(next_mean, next_covariance), deviation_ahead), AugmentedTick(n_fused, *found)
+
+
+@lru_cache(maxsize=32)
+def _all(shape: tuple[int, ...]) -> IntArray:
+    ones = np.ones(shape, dtype=np.int64)
+    ones.flags.writeable = False
+    return ones
 
 
 def states_now(state: AugmentedState, look: Look) -> tuple[FloatArray, FloatArray]:

@@ -61,7 +61,7 @@ window_mixtures: Callable[..., None] = _kernels.window_mixtures
 window_evidence: Callable[..., None] = _kernels.window_evidence
 plain_recordings: Callable[..., None] = _kernels.plain_recordings
 points_on_lines: Callable[..., None] = _kernels.points_on_lines
-augmented_step: Callable[..., None] = _kernels.augmented_step
+augmented_step: Callable[..., int] = _kernels.augmented_step
 split_sums = _kernels_numpy.split_sums
 
 
