@@ -102,7 +102,8 @@ def augmented_tick(
     (n_groups, size), r = values.shape, len(mean)
     q, n_states, empty = n_groups * size, now.path.shape[1], np.empty
     trusted = _all(values.shape) if believed is True else np.asarray(believed, dtype=np.int64)
-    next_mean, next_covariance, deviation_ahead = empty(r), empty((r, r)), Deviation(*map(np.empty_like, deviation))
+    belief_then = Belief(empty(r), empty((r, r)))
+    deviation_then = Deviation(empty(now.path.shape), empty(now.designs.shape), empty(deviation.covariance.shape))
     found = (
         empty(now.path.shape),
         empty((n_groups * n_states // BLOCK, BLOCK, BLOCK)),
@@ -115,9 +116,9 @@ def augmented_tick(
     )
     n_fused = kernels.augmented_step(
         values, trusted, *now, *ahead, sensors, noise, *moves, mean, covariance, *deviation,
-        next_mean, next_covariance, *deviation_ahead, *found,
+        *belief_then, *deviation_then, *found,
     )  # fmt: skip
-    return AugmentedState(Belief(next_mean, next_covariance), deviation_ahead), AugmentedTick(n_fused, *found)
+    return AugmentedState(belief_then, deviation_then), AugmentedTick(n_fused, *found)
 
 
 @lru_cache(maxsize=32)
