@@ -487,7 +487,7 @@ def test_arrays_of_a_tick_must_fit():
     for i, array in enumerate(before):
         for wrong in (np.ones((*array.shape[:-1], 2), dtype=array.dtype), array.astype(np.float32), array[None]):
             with pytest.raises(ValueError, match="expected"):
-                Tick(tuple(before[:i] + [wrong] + before[i + 1 :]), (1, 1, 1, 1, 1)).after(_compiled())
+                Tick((*before[:i], wrong, *before[i + 1 :]), (1, 1, 1, 1, 1)).after(_compiled())
     with pytest.raises(TypeError, match="28 arrays"):
         _compiled().augmented_step(*before)
 

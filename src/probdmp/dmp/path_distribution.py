@@ -63,7 +63,7 @@ def parameter_factor(covariance: FloatArray) -> FloatArray:
 
 
 def signal_factors(covariance: FloatArray, n_signals: int) -> tuple[FloatArray, FloatArray]:
-    """x[s] = F[s] z[s] with z of unit variances, of which each signal has its own: F (S, n, W) and the covariance of z (S W, S W).
+    """x[s] = F[s] z[s], z of unit variances, of which each signal has its own: F (S, n, W) and the covariance of z (S W, S W).
 
     Of the factor of all parameters each signal has the rows F[s] V[s], by singular values; z[s] = V[s] z, so z has covariance
     V V^T, without a division by what is small.

@@ -2,8 +2,8 @@
 
 How much a reading says, and about what, follows from the model, the time and which readings there are; not from what they read.
 So executions of one primitive that last equally long, are told the same kinds of things and miss the same readings share all
-gains. Each is then filtered by a linear recursion for what deviates from its plan: of the parameters x' and of the states around
-them d',
+gains. Each is then filtered by a linear recursion for what deviates from its plan: of the parameters x' and of the states
+around them d',
 
     e[t] = o[t] - C (plan[t] + s[t]),   s[t] = rows[t] x'[t] + d'[t]
     (x', d') <- (x', A d') + K[t] e[t]
@@ -82,9 +82,7 @@ class GainSchedule:
         return float(self.share_constants.sum()) - 0.5 * squares
 
 
-def gain_schedule(
-    primitive: Primitive, task: Task, dt: float, array: SensorArray, seen: BoolArray
-) -> GainSchedule:
+def gain_schedule(primitive: Primitive, task: Task, dt: float, array: SensorArray, seen: BoolArray) -> GainSchedule:
     """The gains of executions like one; those computed last are kept.
 
     Parameters

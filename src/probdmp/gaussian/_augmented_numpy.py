@@ -51,7 +51,7 @@ def augmented_step(
     mean, covariance : of z, (G W) and (G W, G W); of the covariance the lower triangle, here and where it is written.
     offset, loading, spread : of the deviations given z, (G, n), (G, n, W) and (G, n, n) arrays.
     next_mean, next_covariance, next_offset, next_loading, next_spread : written, the same at the next tick.
-    states, state_covariances : written, (G, n), and (G n / b, b, b) blocks along the diagonal of the covariance: at the next tick.
+    states, state_covariances : written, of the next tick, (G, n), and (G n / b, b, b) blocks along the diagonal.
     innovations, innovation_covariance : written, (G S) and (G S, G S) arrays.
     log_likelihoods, fused : written, (G S) arrays.
     gains : written, of z, (G S, G W), or (0, G W) where nobody asks.
