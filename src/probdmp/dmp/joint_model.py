@@ -173,7 +173,7 @@ def mean_positions(executions: JointExecutions) -> FloatArray:
 
 @lru_cache(maxsize=32)
 def _start_and_parameters(primitive: Primitive) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Mean of x (S, N + 3), F (S, N + 3, r) and P (r, r) of executions whose start is not known; kept, as they are read-only."""
+    """Mean of x (S, N + 3), F (S, N + 3, r) and P (r, r) of executions whose start is not known; kept, since read-only."""
     d, n = primitive.n_dof, primitive.configuration.n_basis + 3
     mean, parameters = signal_distribution(primitive)
     mean[:d, START] = primitive.start
