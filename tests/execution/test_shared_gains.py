@@ -18,6 +18,7 @@ from probdmp.execution import (
     score_batch,
 )
 from probdmp.execution.gain_schedule import gain_schedule
+from probdmp.execution.joint_steps import JointFilter
 from probdmp.execution.plans import planned_states
 from probdmp.execution.readings import readings_of
 
@@ -105,6 +106,30 @@ def test_innovations_of_a_schedule_are_those_of_the_filter(seed, coupling, chann
     np.testing.assert_array_equal(schedule.fused, fused)
     np.testing.assert_allclose(found[:, 0][fused], expected.innovations[:, 0][fused], rtol=1e-8, atol=1e-9)
     np.testing.assert_allclose(schedule.innovation_covariances, expected.innovation_covariances[:, 0], rtol=1e-9, atol=1e-15)
+
+
+@settings(max_examples=15)
+@given(seeds, st.booleans(), st.sampled_from([(), ("force",)]), st.sampled_from([None, 0, 1, 17, 30]))
+def test_ticks_are_those_of_the_recording(seed, coupling, channels, gap):
+    """Whatever the sensors, whichever reading is missed, and after the end of what was prepared."""
+    rng = np.random.default_rng(seed)
+    primitive = make_joint_primitive(rng, channels=channels)
+    sensors = random_sensors(rng, primitive, DT, 2, coupling=coupling) if rng.integers(2) else None
+    array, task, chunk = SensorArray(primitive, sensors), task_for(primitive), 20
+    recording = sample_recordings(primitive, task, DT, 1, rng, array)[0]
+    readings = readings_of(array, recording)
+    if gap is not None:
+        readings[min(gap, len(readings) - 1), 0] = np.nan
+    names = {name: readings[:, part] for name, part in array.slices.items()}
+    expected = filter_recordings(primitive, [task], [recording_of_readings(array, names, DT)], array)
+    filtering = JointFilter(primitive, task, DT, chunk, array)
+    for t, reading in enumerate(readings):
+        tick = filtering.step(reading)
+        np.testing.assert_array_equal(tick.fused, expected.fused[t, 0])
+        assert tick.n_fused == tick.fused.sum()
+        np.testing.assert_allclose(tick.innovations, expected.innovations[t, 0], rtol=1e-7, atol=1e-9 * array.scales.max())
+        np.testing.assert_allclose(tick.innovation_covariance, expected.innovation_covariances[t, 0], rtol=1e-8, atol=1e-15)
+        np.testing.assert_allclose(tick.contributions, expected.log_likelihoods[t, 0], rtol=1e-6, atol=1e-6)
 
 
 def test_schedules_are_kept():
