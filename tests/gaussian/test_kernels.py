@@ -647,6 +647,89 @@ def test_arrays_that_do_not_fit_are_refused(fault):
         _compiled().squared_innovations(*arguments)
 
 
+@dataclass
+class Tick:
+    """One tick of groups of states on top of a Gaussian that stands still, G groups of n states, S outputs and W of the z."""
+
+    before: tuple[np.ndarray, ...]
+    shape: tuple[int, ...]
+
+    def after(self, module, with_gains=True):
+        g, size, n, w, b = self.shape
+        q, r = g * size, g * w
+        shapes = ((r,), (r, r), (g, n), (g, n, w), (g, n, n), (g, n), (g * n // b, b, b), (q,), (q, q), (q,))
+        found = [np.full(shape, -7.0) for shape in shapes]
+        fused, gains = np.full(q, -7), [np.full((q if with_gains else 0, r), -7.0), np.full((g, n, size), -7.0)]
+        module.augmented_step(*self.before, *found, fused, *gains)
+        found[1] = np.tril(found[1])
+        return [*found, fused, *gains]
+
+
+@st.composite
+def ticks(draw):
+    rng, missing = np.random.default_rng(draw(seeds)), draw(st.sampled_from([0.0, 0.0, 0.3, 1.0]))
+    g, size, blocks, b, w = (draw(st.integers(1, most)) for most in (7, 3, 3, 3, 19))
+    n, r = blocks * b, g * w
+
+    def covariance(*batch, size):
+        root = rng.normal(size=(*batch, size, size)) / np.sqrt(size)
+        return root @ root.mT
+
+    observation = rng.normal(size=(g, size))
+    observation[rng.random((g, size)) < missing] = np.nan
+    believed = (rng.random((g, size)) >= draw(st.sampled_from([0.0, 0.3]))).astype(np.int64)
+    known = covariance(size=r)
+    known[np.triu_indices(r, 1)] = np.nan  # nobody looks there
+    noise = draw(st.sampled_from([1e-2, 1.0])) * (covariance(g, size=size) + np.eye(size))
+    looks = (rng.normal(size=shape) for shape in ((g, n), (g, n, w), (g, n), (g, n, w), (g, size, n)))
+    moves = (rng.normal(size=(g, n, n)) / np.sqrt(n), covariance(g, size=n))
+    before = (rng.normal(size=r), known, rng.normal(size=(g, n)), rng.normal(size=(g, n, w)), covariance(g, size=n))
+    return Tick((observation, believed, *looks, noise, *moves, *before), (g, size, n, w, b))
+
+
+@needs_extension
+@given(ticks(), st.booleans())
+def test_augmented_ticks_are_alike(tick, with_gains):
+    for ours, theirs in zip(tick.after(_compiled(), with_gains), tick.after(_kernels_numpy, with_gains), strict=True):
+        assert_same(ours, theirs)
+
+
+@needs_extension
+def test_a_tick_of_many_outputs_is_alike():
+    """More outputs than of the z, and as many states as 30 degrees of freedom have."""
+    rng = np.random.default_rng(0)
+    g, size, n, w = 1, 40, 90, 7
+    positive = np.eye(n) + 0.1 * np.ones((n, n))
+    looks = [rng.normal(size=shape) for shape in ((g, n), (g, n, w), (g, n), (g, n, w), (g, size, n))]
+    before = (rng.normal(size=w), np.eye(w), np.zeros((g, n)), rng.normal(size=(g, n, w)), positive[None])
+    given_now = (rng.normal(size=(g, size)), np.ones((g, size), dtype=np.int64), *looks)
+    tick = Tick((*given_now, np.eye(size)[None], 0.1 * positive[None], positive[None], *before), (g, size, n, w, 3))
+    for ours, theirs in zip(tick.after(_compiled()), tick.after(_kernels_numpy), strict=True):
+        assert_same(ours, theirs)
+
+
+@pytest.mark.parametrize("module", [_kernels_numpy, pytest.param(kernels, marks=needs_extension)])
+def test_a_tick_that_cannot_be_is_refused(module):
+    ones, two = np.ones((1, 1, 1)), np.ones((1, 2))
+    flat = ones[0]
+    looks = (two, np.ones((1, 2), dtype=np.int64), flat, ones, flat, ones, two[..., None], -9 * np.eye(2)[None])
+    with pytest.raises(ValueError, match=r"(?i)positive definite"):
+        Tick((*looks, ones, ones, flat[0], flat, flat, ones, ones), (1, 2, 1, 1, 1)).after(module)
+
+
+@needs_extension
+def test_arrays_of_a_tick_must_fit():
+    ones = np.ones((1, 1, 1))
+    flat = ones[0]
+    before = [flat, flat.astype(np.int64), flat, ones, flat, ones, ones, ones, ones, ones, flat[0], flat, flat, ones, ones]
+    for i, array in enumerate(before):
+        for wrong in (np.ones((*array.shape[:-1], 2), dtype=array.dtype), array.astype(np.float32), array[None]):
+            with pytest.raises(ValueError, match="expected"):
+                Tick((*before[:i], wrong, *before[i + 1 :]), (1, 1, 1, 1, 1)).after(_compiled())
+    with pytest.raises(TypeError, match="28 arrays"):
+        _compiled().augmented_step(*before)
+
+
 @pytest.mark.parametrize("wanted", ["", "0", "1"])
 def test_the_environment_chooses(wanted):
     code = "from probdmp.gaussian import kernels; print(kernels.COMPILED)"

@@ -3,11 +3,12 @@
 All that is unknown of an execution is drawn once, x = (p0, theta) of every signal, which are the degrees of freedom and the
 sensor channels that were learned with them, and a task tells part of it:
 
-    x = mean + F z,  z ~ N(0, I);    state[t] = rows[t] x + d[t],    o[t] = C state[t] + v[t],  v[t] ~ N(0, R)
+    x = mean + F z,  z ~ N(0, P);    state[t] = rows[t] x + d[t],    o[t] = C state[t] + v[t],  v[t] ~ N(0, R)
 
 What is seen early in a movement says how all of it will go. d is what the parameters leave over (`probdmp.dmp.deviations`).
 What is told of an execution, its goal or its start velocity, is told of rows[t] x. Inference over z and d is in
-`probdmp.gaussian.augmented`; F has no more columns than x has independent directions.
+`probdmp.gaussian.augmented`. Each signal has W of the z for itself, as many as its x has independent directions: F is block
+diagonal, and how signals vary together is in P, whose diagonal is 1. So what is asked of a signal takes W columns, not S W.
 """
 
 import math
@@ -19,12 +20,12 @@ import numpy as np
 from probdmp.checks import BoolArray, FloatArray, frozen
 from probdmp.dmp.deviations import DeviationSystem, deviation_system, lasting_variances
 from probdmp.dmp.goal_handling import conditioned_part
-from probdmp.dmp.path_distribution import parameter_factor, signal_distribution
+from probdmp.dmp.path_distribution import signal_distribution, signal_factors
 from probdmp.dmp.primitive import Primitive
 from probdmp.dmp.responses import GOAL, LONGEST_KEPT, START_VELOCITY, parameter_responses
 from probdmp.dmp.task import Task
 from probdmp.dmp.transformation_system import POSITION
-from probdmp.gaussian import Belief, observe, unit_belief
+from probdmp.gaussian import Belief, observe
 
 __all__ = [
     "JointExecutions",
@@ -48,9 +49,16 @@ class JointModel(NamedTuple):
     means: FloatArray
     """(*batch, S, N + 3) array, units of each signal."""
     factors: FloatArray
-    """F, (*batch, S, N + 3, r) array, units of each signal."""
+    """F, (*batch, S, N + 3, r) array, units of each signal, r = S W; 0 but for a signal's own W columns."""
     belief: Belief
     """Of z, (*batch, r)."""
+
+    @property
+    def blocks(self) -> FloatArray:
+        """F without its zeros, (*batch, S, N + 3, W) array."""
+        *batch, n_signals, n, r = self.factors.shape
+        own = np.diagonal(self.factors.reshape(*batch, n_signals, n, n_signals, r // n_signals), axis1=-4, axis2=-2)
+        return np.ascontiguousarray(np.moveaxis(own, -1, -3))
 
 
 class _Lesson(NamedTuple):
@@ -198,8 +206,8 @@ def mean_positions(executions: JointExecutions) -> FloatArray:
 
 
 @lru_cache(maxsize=32)
-def _start_and_parameters(primitive: Primitive) -> tuple[FloatArray, FloatArray]:
-    """Mean of x, (S, N + 3), and F, (S, N + 3, r), of executions whose start is not known; kept, as they are read-only."""
+def _start_and_parameters(primitive: Primitive) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Mean of x (S, N + 3), F (S, N + 3, r) and P (r, r) of executions whose start is not known; kept, since read-only."""
     d, n = primitive.n_dof, primitive.configuration.n_basis + 3
     mean, parameters = signal_distribution(primitive)
     mean[:d, START] = primitive.start
@@ -207,7 +215,10 @@ def _start_and_parameters(primitive: Primitive) -> tuple[FloatArray, FloatArray]
     covariance[own, START, own, START] = primitive.start_covariances[:, 1, 1]
     covariance[own, START, own, START_VELOCITY + 1] = primitive.start_covariances[:, 0, 1]
     covariance[own, START_VELOCITY + 1, own, START] = primitive.start_covariances[:, 0, 1]
-    return frozen(mean), frozen(parameter_factor(parameters).reshape(len(mean), n, -1))
+    blocks, prior = signal_factors(parameters, len(mean))
+    factors = np.zeros((len(mean), n, len(mean), blocks.shape[-1]))
+    factors[np.arange(len(mean)), :, np.arange(len(mean))] = blocks
+    return frozen(mean), frozen(factors.reshape(len(mean), n, -1)), frozen(prior)
 
 
 def _lessons_of(primitive: Primitive, end_rows: FloatArray, kinds: tuple[BoolArray, ...]) -> _Lessons:
@@ -226,12 +237,12 @@ def _lessons_of(primitive: Primitive, end_rows: FloatArray, kinds: tuple[BoolArr
 def _lessons(
     primitive: Primitive, end_rows: FloatArray, unknown: BoolArray, velocity: BoolArray, moved: BoolArray, goal: BoolArray
 ) -> _Lessons:
-    learned, signals = _start_and_parameters(primitive)[1], primitive.signals
+    (_, learned, prior), signals = _start_and_parameters(primitive), primitive.signals
     factors = np.array(np.broadcast_to(learned, (*unknown.shape[:-1], *learned.shape)))
     factors[..., : primitive.n_dof, START, :] *= unknown[..., None]
     left_over = signals.observation_variances + lasting_variances(primitive)
     tolerances = left_over if signals.residual_variances is None else signals.residual_variances
-    covariance = unit_belief(unknown.shape[:-1], learned.shape[-1]).covariance
+    covariance = np.broadcast_to(prior, (*unknown.shape[:-1], *prior.shape))
 
     def lesson(row: FloatArray, told: BoolArray, tolerances: FloatArray) -> tuple[_Lesson | None, FloatArray]:
         if not told.any():

@@ -8,7 +8,7 @@ from probdmp.dmp.responses import GOAL, START_VELOCITY, WEIGHTS, parameter_respo
 from probdmp.dmp.transformation_system import POSITION
 from probdmp.dmp.variation import PathDistribution
 
-__all__ = ["parameter_distribution", "parameter_factor", "path_distribution", "signal_distribution"]
+__all__ = ["parameter_distribution", "parameter_factor", "path_distribution", "signal_distribution", "signal_factors"]
 
 ROUNDING = 1e-15
 """Directions with less of the variance than this times their number are none."""
@@ -60,6 +60,21 @@ def parameter_factor(covariance: FloatArray) -> FloatArray:
     eigenvalues, vectors = np.linalg.eigh(covariance / stds / stds[:, None])
     kept = eigenvalues > ROUNDING * len(covariance) * max(float(eigenvalues[-1]), 0.0)
     return np.asarray(stds[:, None] * vectors[:, kept] * np.sqrt(eigenvalues[kept]))
+
+
+def signal_factors(covariance: FloatArray, n_signals: int) -> tuple[FloatArray, FloatArray]:
+    """x[s] = F[s] z[s], z of unit variances, of which each signal has its own: F (S, n, W) and the covariance of z (S W, S W).
+
+    Of the factor of all parameters each signal has the rows F[s] V[s], by singular values; z[s] = V[s] z, so z has covariance
+    V V^T, without a division by what is small.
+    """
+    stds = np.sqrt(np.maximum(np.diagonal(covariance), 0.0)).reshape(n_signals, -1)
+    stds = np.where(stds > 0, stds, 1.0)
+    scaled = parameter_factor(covariance).reshape(*stds.shape, -1) / stds[..., None]
+    left, values, right = np.linalg.svd(scaled, full_matrices=False)
+    width = int(np.sum(values**2 > ROUNDING * len(covariance) * np.max(values, initial=0.0) ** 2, axis=-1).max())
+    shown = np.concatenate(right[:, :width])
+    return stds[..., None] * left[..., :width] * values[:, None, :width], shown @ shown.T
 
 
 def path_distribution(primitive: Primitive, n_phases: int) -> PathDistribution:

@@ -20,7 +20,7 @@ from probdmp.gaussian import AffineObservation, Linearization, linearize_extende
 
 __all__ = ["Moments", "SensorArray"]
 
-Values = TypeVar("Values", FloatArray, BoolArray)
+Values = TypeVar("Values", FloatArray, BoolArray, IntArray)
 Moments = Callable[[], tuple[FloatArray, FloatArray]]
 """Mean (*batch, 3 S) and covariance (*batch, 3 S, 3 S) of the states of all signals, computed when they are needed."""
 
@@ -60,6 +60,7 @@ class SensorArray:
         # C of all states, (O, 3 S); rows of nonlinear sensors are zero.
         self.silent = np.isposinf(np.diagonal(covariance))
         """(O,) outputs whose noise is infinite: what they say is never used."""
+        self._is_any_silent = bool(self.silent.any())
         self.covariance = np.where(self.silent[:, None] | self.silent, np.eye(len(covariance)), covariance)
         """R, (O, O), with ones where it is infinite."""
         self._nonlinear = [sensor for sensor in self.sensors if isinstance(sensor, NonlinearSensor)]
@@ -143,7 +144,7 @@ class SensorArray:
 
     def look(self, observation: FloatArray, predicted: Moments) -> AffineObservation:
         """What an observation (*batch, O) says of the groups of states: values (*batch, G, size), C and R."""
-        values = np.where(self.silent, np.nan, observation) if self.silent.any() else observation
+        values = np.where(self.silent, np.nan, observation) if self._is_any_silent else observation
         if not self.is_adaptive:
             return AffineObservation(self.grouped(values), self.matrix, self.noise)
         mean, covariance = predicted()

@@ -7,7 +7,7 @@ import numpy as np
 from probdmp.checks import FloatArray
 from probdmp.dmp import Primitive, Task, linear_gaussian_model
 from probdmp.execution.independent_filtering import look_through, of_each_dof, sensed_system
-from probdmp.execution.joint_steps import LATER_CHUNK, joint_filter
+from probdmp.execution.joint_steps import LATER_CHUNK, JointFilter
 from probdmp.execution.sensed_ticks import RECORD_SIZE, RecordedTick, SensedTick, Tick
 from probdmp.execution.sensor_array import SensorArray
 from probdmp.gaussian import block_diagonal, kernels, output_shares, predict, update
@@ -35,7 +35,7 @@ def step_filter(primitive: Primitive, task: Task, dt: float, chunk: int, array: 
     chunk : for how many ticks it is prepared; the movement need not end then.
     """
     if primitive.configuration.weight_uncertainty == "joint":
-        return joint_filter(primitive, task, dt, chunk, array)
+        return JointFilter(primitive, task, dt, chunk, array)
     if array.is_plain and not array.is_coupled and not array.is_adaptive and not array.silent.any():
         return PlainFilter(primitive, task, dt, chunk, array)
     return IndependentFilter(primitive, task, dt, chunk, array)

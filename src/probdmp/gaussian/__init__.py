@@ -8,6 +8,15 @@ from probdmp.gaussian.augmented import (
     predict_deviation,
     smooth_deviations,
 )
+from probdmp.gaussian.augmented_steps import (
+    AugmentedState,
+    AugmentedTick,
+    Look,
+    Moves,
+    augmented_tick,
+    no_observations,
+    states_now,
+)
 from probdmp.gaussian.coupling import block_diagonal, couple_systems
 from probdmp.gaussian.density import gaussian_log_density, output_shares
 from probdmp.gaussian.filtering import AffineObservation, FilteredSequence, filter_sequence, predict, update
@@ -20,6 +29,8 @@ from probdmp.gaussian.static import Belief, StaticUpdate, linear_moments, observ
 
 __all__ = [
     "AffineObservation",
+    "AugmentedState",
+    "AugmentedTick",
     "AugmentedUpdate",
     "Belief",
     "Deviation",
@@ -27,8 +38,11 @@ __all__ = [
     "GaussianSequence",
     "LinearGaussianModel",
     "Linearization",
+    "Look",
+    "Moves",
     "SharedGains",
     "StaticUpdate",
+    "augmented_tick",
     "block_diagonal",
     "couple_systems",
     "filter_sequence",
@@ -37,6 +51,7 @@ __all__ = [
     "linearize_extended",
     "linearize_unscented",
     "no_deviation",
+    "no_observations",
     "observe",
     "observe_deviation",
     "output_shares",
@@ -49,6 +64,7 @@ __all__ = [
     "smooth_deviations",
     "smooth_sequence",
     "smooth_series",
+    "states_now",
     "unit_belief",
     "update",
     "wrapped",

@@ -31,6 +31,7 @@
 
 #define MOST_STATES 4
 #define OUTPUTS 4 /* rows of maps that are multiplied with a window at once */
+#define ROWS 4 /* of a covariance that are changed at once */
 #define TILE 64 /* observations of each that are brought side by side at a time */
 #define LARGEST_MAGNITUDE 1e100 /* see checks.py */
 #define LOG_2PI 1.8378770664093453
@@ -200,6 +201,18 @@ typedef struct {
     const int64_t *after;
 } Recordings;
 
+/* Groups of states that move on top of z, which stands still; see augmented_steps.py. There are n_outputs = n_groups size outputs. */
+typedef struct {
+    Py_ssize_t n_groups, size, n_states, width, block, n_outputs, n_latent, n_gains;
+    const double *observation, *path, *designs, *next_path, *next_designs, *sensors, *noise, *transition, *driven;
+    const double *mean, *covariance, *offset, *loading, *spread; /* of a covariance of z the lower triangle, here and below */
+    const int64_t *believed;
+    double *next_mean, *next_covariance, *next_offset, *next_loading, *next_spread, *states, *state_covariances;
+    double *innovations, *innovation_covariance, *log_likelihoods, *gains, *deviation_gains;
+    int64_t *fused;
+    double *looks, *errors, *white, *totals, *factor, *shown, *rows, *columns, *some; /* to work in */
+} Augmented;
+
 /* ---- Loops, for any processor and for AVX2 ------------------------------------------------------------------------------ */
 
 /* Each of them has two names. */
@@ -265,6 +278,26 @@ typedef struct {
 #define look_for_odd NAMED(look_for_odd)
 #define draw_lines NAMED(draw_lines)
 
+#define no_sum NAMED(no_sum)
+#define dot NAMED(dot)
+#define add_multiple NAMED(add_multiple)
+#define sum_of NAMED(sum_of)
+#define both_ways NAMED(both_ways)
+#define multiply NAMED(multiply)
+#define multiply_transposed NAMED(multiply_transposed)
+#define triangle_times NAMED(triangle_times)
+#define factorize NAMED(factorize)
+#define solve NAMED(solve)
+#define look_at_group NAMED(look_at_group)
+#define spread_looks NAMED(spread_looks)
+#define compare_outputs NAMED(compare_outputs)
+#define whiten_tick NAMED(whiten_tick)
+#define share_density NAMED(share_density)
+#define know_more NAMED(know_more)
+#define move_group NAMED(move_group)
+#define expect_group NAMED(expect_group)
+#define augmented_all NAMED(augmented_all)
+
 #define NAMED(name) name##_anywhere
 #include "_kernels.c"
 #undef NAMED
@@ -283,6 +316,7 @@ static void look_at_processor(void) { has_avx2 = __builtin_cpu_supports("avx2") 
 #define CHOOSE(name) name##_anywhere
 static void look_at_processor(void) {}
 #endif
+#undef augmented_all
 #undef filter_all
 #undef look_at_windows
 #undef weigh_all
@@ -847,6 +881,79 @@ static PyObject *points_on_lines(PyObject *module, PyObject *const *arguments, P
     Py_RETURN_NONE;
 }
 
+/* ---- augmented_step ----------------------------------------------------------------------------------------------------- */
+
+/* Room for the arrays to work in; NULL without memory. */
+static double *augmented_room(Augmented *s)
+{
+    const Py_ssize_t q = s->n_outputs, r = s->n_latent, n = s->n_states, w = s->width, size = s->size;
+    const Py_ssize_t sizes[] = {q * w, q, q, q * size, q * q, q * r, q * (r + ROWS), q * (r + WIDTH),
+                                n * (1 + 2 * w + size + 3 * n) + size * size};
+    double **const parts[] = {&s->looks, &s->errors, &s->white, &s->totals, &s->factor, &s->shown, &s->rows, &s->columns, &s->some};
+    enum { COUNT = sizeof(sizes) / sizeof(sizes[0]) };
+    Py_ssize_t total = 0;
+    for (int i = 0; i < COUNT; i++) total += sizes[i];
+    double *work = malloc((total + 1) * sizeof(double)), *next = work;
+    for (int i = 0; work && i < COUNT; next += sizes[i++]) *parts[i] = next;
+    return work;
+}
+
+/* The GIL is kept: who waits for a tick would wait for it once more. */
+static PyObject *augmented_step(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
+{
+    static const Spec specs[] = {
+        {"observation", 0, 2, 0}, {"believed", 0, 2, 1}, {"path", 0, 2, 0}, {"designs", 0, 3, 0}, {"next_path", 0, 2, 0},
+        {"next_designs", 0, 3, 0}, {"sensors", 0, 3, 0}, {"noise", 0, 3, 0}, {"transition", 0, 3, 0}, {"driven", 0, 3, 0},
+        {"mean", 0, 1, 0}, {"covariance", 0, 2, 0}, {"offset", 0, 2, 0}, {"loading", 0, 3, 0}, {"spread", 0, 3, 0},
+        {"next_mean", 1, 1, 0}, {"next_covariance", 1, 2, 0}, {"next_offset", 1, 2, 0}, {"next_loading", 1, 3, 0},
+        {"next_spread", 1, 3, 0}, {"states", 1, 2, 0}, {"state_covariances", 1, 3, 0}, {"innovations", 1, 1, 0},
+        {"innovation_covariance", 1, 2, 0}, {"log_likelihoods", 1, 1, 0}, {"fused", 1, 1, 1}, {"gains", 1, 2, 0},
+        {"deviation_gains", 1, 3, 0},
+    };
+    enum { COUNT = sizeof(specs) / sizeof(specs[0]) };
+    Array x[COUNT];
+    if (take(arguments, given, specs, COUNT, x) < 0) return NULL;
+    const Py_ssize_t g = x[3].view.shape[0], n = x[3].view.shape[1], w = x[3].view.shape[2], size = x[0].view.shape[1];
+    const Py_ssize_t q = g * size, r = g * w, b = x[21].view.shape[1], n_gains = x[26].view.shape[0];
+    const Py_ssize_t wanted[COUNT][4] = {
+        {g, size}, {g, size}, {g, n}, {g, n, w}, {g, n}, {g, n, w}, {g, size, n}, {g, size, size}, {g, n, n}, {g, n, n},
+        {r}, {r, r}, {g, n}, {g, n, w}, {g, n, n}, {r}, {r, r}, {g, n}, {g, n, w}, {g, n, n}, {g, n},
+        {b > 0 ? g * n / b : 0, b, b}, {q}, {q, q}, {q}, {q}, {n_gains ? q : 0, r}, {g, n, size},
+    };
+    Py_ssize_t n_fused = 0;
+    int done = 1;
+    for (int i = 0; done && i < COUNT; i++)
+        done = agree(&x[i], specs[i].name, wanted[i][0], wanted[i][1], wanted[i][2], wanted[i][3]);
+    if (done && (b < 1 || n % b)) {
+        PyErr_Format(PyExc_ValueError, "state_covariances: expected blocks of a part of %zd states, got %zd", n, b);
+        done = 0;
+    }
+    Augmented s = {
+        .n_groups = g, .size = size, .n_states = n, .width = w, .block = b, .n_outputs = q, .n_latent = r, .n_gains = n_gains,
+        .observation = x[0].data, .believed = x[1].integers, .path = x[2].data, .designs = x[3].data, .next_path = x[4].data,
+        .next_designs = x[5].data, .sensors = x[6].data, .noise = x[7].data, .transition = x[8].data, .driven = x[9].data,
+        .mean = x[10].data, .covariance = x[11].data, .offset = x[12].data, .loading = x[13].data, .spread = x[14].data,
+        .next_mean = x[15].data, .next_covariance = x[16].data, .next_offset = x[17].data, .next_loading = x[18].data,
+        .next_spread = x[19].data, .states = x[20].data, .state_covariances = x[21].data, .innovations = x[22].data,
+        .innovation_covariance = x[23].data, .log_likelihoods = x[24].data, .fused = x[25].view.buf, .gains = x[26].data,
+        .deviation_gains = x[27].data,
+    };
+    if (done) {
+        double *work = augmented_room(&s);
+        done = work != NULL;
+        if (!done)
+            PyErr_NoMemory();
+        else if (!CHOOSE(augmented_all)(&s)) {
+            PyErr_SetString(PyExc_ValueError, "expected innovations with a positive definite covariance");
+            done = 0;
+        }
+        for (Py_ssize_t o = 0; done && o < q; o++) n_fused += s.fused[o] != 0;
+        free(work);
+    }
+    release(x, COUNT);
+    return done ? PyLong_FromSsize_t(n_fused) : NULL;
+}
+
 /* ---- The module --------------------------------------------------------------------------------------------------------- */
 
 #define FUNCTION(name) {#name, (PyCFunction)(void (*)(void))name, METH_FASTCALL, NULL}
@@ -854,7 +961,7 @@ static PyObject *points_on_lines(PyObject *module, PyObject *const *arguments, P
 static PyMethodDef functions[] = {
     FUNCTION(filter_systems), FUNCTION(squared_innovations), FUNCTION(smoothed_states), FUNCTION(smooth_backwards),
     FUNCTION(least_squares), FUNCTION(window_evidence), FUNCTION(window_ratios), FUNCTION(window_sums), FUNCTION(whiten),
-    FUNCTION(plain_recordings), FUNCTION(points_on_lines),
+    FUNCTION(plain_recordings), FUNCTION(points_on_lines), FUNCTION(augmented_step),
     {NULL, NULL, 0, NULL},
 };
 
@@ -1814,6 +1921,354 @@ static AS_WRITTEN void draw_lines(const Recordings *s, double *points)
             }
         }
     }
+}
+
+/* ---- What moves on top of a Gaussian that stands still ------------------------------------------------------------------ */
+
+INLINE Lane no_sum(void)
+{
+    const double none[WIDTH] = {0};
+    return load(none);
+}
+
+INLINE double sum_of(Lane x)
+{
+#ifdef MASK
+    const Vector both = x.part[0] + x.part[1];
+    return (both[0] + both[2]) + (both[1] + both[3]);
+#else
+    return (x.part[0] + x.part[2]) + (x.part[1] + x.part[3]);
+#endif
+}
+
+INLINE double dot(const double *x, const double *y, Py_ssize_t n)
+{
+    Lane sums = no_sum();
+    Py_ssize_t i = 0;
+    for (; i + WIDTH <= n; i += WIDTH) sums = plus_product(sums, load(x + i), load(y + i));
+    double total = sum_of(sums);
+    for (; i < n; i++) total += x[i] * y[i];
+    return total;
+}
+
+/* to += factor x */
+INLINE void add_multiple(double *to, double factor, const double *x, Py_ssize_t n)
+{
+    Py_ssize_t i = 0;
+    for (; i + WIDTH <= n; i += WIDTH) store(to + i, plus(load(to + i), factor, load(x + i)));
+    for (; i < n; i++) to[i] += factor * x[i];
+}
+
+/* Some rows of a symmetric matrix, which are read once: to += factors rows, and what is given are the sums rows y. */
+INLINE void both_ways(const double *rows, Py_ssize_t stride, Py_ssize_t n_rows, Py_ssize_t n, const double *y,
+                      const double *factors, double *to, double *sums)
+{
+    const Lane zero = no_sum();
+    Lane sum[ROWS] = {zero, zero, zero, zero};
+    const double *row[ROWS];
+    double factor[ROWS];
+    for (int k = 0; k < ROWS; k++) { /* those that are too many are the last once more, without weight */
+        row[k] = rows + (k < n_rows ? k : n_rows - 1) * stride;
+        factor[k] = k < n_rows ? factors[k] : 0;
+    }
+    Py_ssize_t i = 0;
+    for (; i + WIDTH <= n; i += WIDTH) {
+        const Lane other = load(y + i);
+        Lane more = load(to + i);
+        UNROLL for (int k = 0; k < ROWS; k++) {
+            const Lane some = load(row[k] + i);
+            sum[k] = plus_product(sum[k], some, other);
+            more = plus(more, factor[k], some);
+        }
+        store(to + i, more);
+    }
+    UNROLL for (int k = 0; k < ROWS; k++) sums[k] = sum_of(sum[k]);
+    for (; i < n; i++)
+        for (int k = 0; k < ROWS; k++) {
+            sums[k] += row[k][i] * y[i];
+            to[i] += factor[k] * row[k][i];
+        }
+}
+
+/* product = a b, of (n, k) and (k, m). */
+INLINE void multiply(Py_ssize_t n, Py_ssize_t k, Py_ssize_t m, const double *a, const double *b, double *product)
+{
+    memset(product, 0, n * m * sizeof(double));
+    for (Py_ssize_t i = 0; i < n; i++)
+        for (Py_ssize_t j = 0; j < k; j++) add_multiple(product + i * m, a[i * k + j], b + j * m, m);
+}
+
+/* product += a b^T, of (n, k) and (m, k). */
+INLINE void multiply_transposed(Py_ssize_t n, Py_ssize_t k, Py_ssize_t m, const double *a, const double *b, double *product)
+{
+    for (Py_ssize_t i = 0; i < n; i++)
+        for (Py_ssize_t j = 0; j < m; j++) product[i * m + j] += dot(a + i * k, b + j * k, k);
+}
+
+/* product = x P, for k rows x and a symmetric P of which there is the lower triangle; rows of P and of the product lie further
+   apart. */
+static void triangle_times(Py_ssize_t n, Py_ssize_t k, const double *p, Py_ssize_t stride, const double *x, double *product,
+                           Py_ssize_t apart)
+{
+    for (Py_ssize_t a = 0; a < k; a++) memset(product + a * apart, 0, n * sizeof(double));
+    for (Py_ssize_t i = 0; i < n; i += ROWS, p += ROWS * stride) {
+        const Py_ssize_t n_rows = n - i < ROWS ? n - i : ROWS;
+        for (Py_ssize_t a = 0; a < k; a++) {
+            const double *factors = x + a * n + i;
+            double *to = product + a * apart, sums[ROWS];
+            both_ways(p, stride, n_rows, i, x + a * n, factors, to, sums);
+            for (Py_ssize_t j = 0; j < n_rows; j++) {
+                const double *corner = p + j * stride + i;
+                to[i + j] += sums[j] + factors[j] * corner[j];
+                for (Py_ssize_t l = 0; l < j; l++) {
+                    to[i + j] += factors[l] * corner[l];
+                    to[i + l] += factors[j] * corner[l];
+                }
+            }
+        }
+    }
+}
+
+/* A = L L^T, in place; 0 if there is no such L. */
+INLINE int factorize(Py_ssize_t n, double *a)
+{
+    for (Py_ssize_t i = 0; i < n; i++)
+        for (Py_ssize_t j = 0; j <= i; j++) {
+            const double rest = a[i * n + j] - dot(a + i * n, a + j * n, j);
+            if (i == j && !(rest > 0)) return 0;
+            a[i * n + j] = i == j ? sqrt(rest) : rest / a[j * n + j];
+        }
+    return 1;
+}
+
+/* x = (L L^T)^-1 x, in place. */
+INLINE void solve(Py_ssize_t n, const double *factor, double *x)
+{
+    for (Py_ssize_t i = 0; i < n; i++) x[i] = (x[i] - dot(factor + i * n, x, i)) / factor[i * n + i];
+    for (Py_ssize_t i = n - 1; i >= 0; i--) {
+        for (Py_ssize_t j = i + 1; j < n; j++) x[i] -= factor[j * n + i] * x[j];
+        x[i] /= factor[i * n + i];
+    }
+}
+
+/* What the outputs of a group see: of z, (size, w), of the deviation, V C^T, and how uncertain that is, C V C^T + R. */
+INLINE void look_at_group(const Augmented *s, Py_ssize_t g)
+{
+    const Py_ssize_t n = s->n_states, w = s->width, size = s->size;
+    const double *sensors = s->sensors + g * size * n, *m = s->mean + g * w;
+    double *seen = s->deviation_gains + g * n * size, *total = s->totals + g * size * size;
+    memset(seen, 0, n * size * sizeof(double));
+    multiply_transposed(n, n, size, s->spread + g * n * n, sensors, seen);
+    multiply(size, n, size, sensors, seen, total);
+    add_multiple(total, 1.0, s->noise + g * size * size, size * size);
+    for (Py_ssize_t a = 0; a < size; a++) {
+        const Py_ssize_t o = g * size + a;
+        double *look = s->looks + o * w, error = s->observation[o];
+        memset(look, 0, w * sizeof(double));
+        for (Py_ssize_t i = 0; i < n; i++) {
+            const double c = sensors[a * n + i];
+            if (c == 0) continue;
+            error -= c * (s->path[g * n + i] + s->offset[g * n + i]);
+            add_multiple(look, c, s->designs + (g * n + i) * w, w);
+            add_multiple(look, c, s->loading + (g * n + i) * w, w);
+        }
+        s->errors[o] = error;
+        s->innovations[o] = error - dot(look, m, w);
+        s->fused[o] = s->believed[o] && !isnan(error);
+    }
+}
+
+/* P G^T, one row for each output. */
+INLINE void spread_looks(const Augmented *s)
+{
+    const Py_ssize_t w = s->width, size = s->size, r = s->n_latent;
+    memset(s->shown, 0, s->n_outputs * r * sizeof(double));
+    for (Py_ssize_t g = 0; g < s->n_groups; g++) {
+        const double *looks = s->looks + g * size * w, *own = s->covariance + g * w * (r + 1);
+        triangle_times(w, size, own, r, looks, s->shown + g * size * r + g * w, r);
+        for (Py_ssize_t i = 0; i < w; i += ROWS) {
+            const double *rows = s->covariance + (g * w + i) * r;
+            const Py_ssize_t n_rows = w - i < ROWS ? w - i : ROWS;
+            for (Py_ssize_t o = 0; o < g * size; o++) {
+                const Py_ssize_t first = o / size * w, a = o % size;
+                double sums[ROWS];
+                both_ways(rows + first, r, n_rows, w, s->looks + o * w, looks + a * w + i,
+                          s->shown + (g * size + a) * r + first, sums);
+                memcpy(s->shown + o * r + g * w + i, sums, n_rows * sizeof(double));
+            }
+        }
+    }
+}
+
+/* S of all outputs, and L of those that count; a unit for those that do not. */
+INLINE int compare_outputs(const Augmented *s)
+{
+    const Py_ssize_t q = s->n_outputs, size = s->size, w = s->width;
+    for (Py_ssize_t o = 0; o < q; o++)
+        for (Py_ssize_t p = 0; p <= o; p++) {
+            double value = dot(s->shown + o * s->n_latent + p / size * w, s->looks + p * w, w);
+            if (o / size == p / size) value += s->totals[o * size + p % size];
+            s->innovation_covariance[o * q + p] = s->innovation_covariance[p * q + o] = value;
+            s->factor[o * q + p] = s->fused[o] && s->fused[p] ? value : o == p;
+        }
+    return factorize(q, s->factor);
+}
+
+/* W = P G^T L^-T and L^-1 e of what counts, and what is known about the mean of z; the gains W L^-1 where they are wanted. */
+INLINE void whiten_tick(const Augmented *s)
+{
+    const Py_ssize_t q = s->n_outputs, r = s->n_latent;
+    memcpy(s->next_mean, s->mean, r * sizeof(double));
+    for (Py_ssize_t o = 0; o < q; o++) {
+        double *row = s->shown + o * r, white = s->fused[o] ? s->innovations[o] : 0;
+        const double *factor = s->factor + o * q, scale = 1 / factor[o];
+        for (Py_ssize_t p = 0; p < o; p++) {
+            if (factor[p] == 0) continue;
+            white -= factor[p] * s->white[p];
+            add_multiple(row, -factor[p], s->shown + p * r, r);
+        }
+        s->white[o] = white * scale;
+        for (Py_ssize_t i = 0; i < r; i++) row[i] = s->fused[o] ? row[i] * scale : 0;
+        add_multiple(s->next_mean, s->white[o], row, r);
+    }
+    for (Py_ssize_t o = s->n_gains - 1; o >= 0; o--) {
+        double *gain = s->gains + o * r;
+        memcpy(gain, s->shown + o * r, r * sizeof(double));
+        for (Py_ssize_t p = o + 1; p < q; p++) add_multiple(gain, -s->factor[p * q + o], s->gains + p * r, r);
+        for (Py_ssize_t i = 0; i < r; i++) gain[i] /= s->factor[o * q + o];
+    }
+}
+
+/* As log_density_shares in density.py. */
+INLINE void share_density(const Augmented *s)
+{
+    const Py_ssize_t q = s->n_outputs;
+    double correlation = 0, n_fused = 0;
+    for (Py_ssize_t o = 0; o < q; o++) {
+        if (!s->fused[o]) continue;
+        correlation += 2 * log(s->factor[o * q + o]) - log(s->innovation_covariance[o * q + o]);
+        n_fused++;
+    }
+    for (Py_ssize_t o = q - 1; o >= 0; o--) { /* white becomes S^-1 e */
+        for (Py_ssize_t p = o + 1; p < q; p++) s->white[o] -= s->factor[p * q + o] * s->white[p];
+        s->white[o] /= s->factor[o * q + o];
+        const double square = s->innovations[o] * s->white[o], variance = s->innovation_covariance[o * q + o];
+        s->log_likelihoods[o] = s->fused[o] ? -0.5 * (square + LOG_2PI + log(variance) + correlation / n_fused) : 0;
+    }
+}
+
+/* P - W W^T: the lower triangle, in tiles of ROWS and a lane, for which the outputs that count are brought together. */
+INLINE void know_more(const Augmented *s)
+{
+    const Py_ssize_t r = s->n_latent;
+    Py_ssize_t n = 0, q = 0;
+    for (Py_ssize_t o = 0; o < s->n_outputs; o++) q += s->fused[o] != 0;
+    for (Py_ssize_t o = 0; o < s->n_outputs; o++) {
+        const double *row = s->shown + o * r;
+        if (!s->fused[o]) continue;
+        for (Py_ssize_t i = 0; i < r || i % ROWS; i++) s->rows[(i / ROWS * q + n) * ROWS + i % ROWS] = i < r ? row[i] : 0;
+        for (Py_ssize_t i = 0; i < r || i % WIDTH; i++) s->columns[(i / WIDTH * q + n) * WIDTH + i % WIDTH] = i < r ? row[i] : 0;
+        n++;
+    }
+    for (Py_ssize_t i = 0; i < r; i += ROWS) {
+        const Py_ssize_t n_rows = r - i < ROWS ? r - i : ROWS;
+        for (Py_ssize_t j = 0; j < i + n_rows; j += WIDTH) {
+            const double *row = s->rows + i * q, *column = s->columns + j * q;
+            const Lane zero = no_sum();
+            Lane sum[ROWS] = {zero, zero, zero, zero};
+            for (Py_ssize_t o = 0; o < q; o++, row += ROWS, column += WIDTH) {
+                const Lane some = load(column);
+                UNROLL for (int k = 0; k < ROWS; k++) sum[k] = plus(sum[k], row[k], some);
+            }
+            const double *from = s->covariance + i * r + j;
+            double *to = s->next_covariance + i * r + j, parts[ROWS][WIDTH];
+            if (i + ROWS <= r && j + WIDTH <= r) {
+                UNROLL for (int k = 0; k < ROWS; k++) store(to + k * r, plus(load(from + k * r), -1.0, sum[k]));
+                continue;
+            }
+            UNROLL for (int k = 0; k < ROWS; k++) store(parts[k], sum[k]);
+            for (Py_ssize_t k = 0; k < n_rows; k++)
+                for (Py_ssize_t w = 0; w < WIDTH && j + w < r; w++) to[k * r + w] = from[k * r + w] - parts[k][w];
+        }
+    }
+}
+
+/* K from V C^T, in place, of what counts; the deviation given z after the observation, and one step ahead. */
+INLINE int move_group(const Augmented *s, Py_ssize_t g)
+{
+    const Py_ssize_t n = s->n_states, w = s->width, size = s->size;
+    const double *sensors = s->sensors + g * size * n, *transition = s->transition + g * n * n;
+    double *gains = s->deviation_gains + g * n * size, *offset = s->some, *loading = offset + n, *noisy = loading + n * w;
+    double *kept = noisy + n * size, *spread = kept + n * n, *product = spread + n * n, *known = product + n * n;
+    const int64_t *fused = s->fused + g * size;
+    for (Py_ssize_t a = 0; a < size; a++)
+        for (Py_ssize_t b = 0; b < size; b++)
+            known[a * size + b] = fused[a] && fused[b] ? s->totals[(g * size + a) * size + b] : a == b;
+    if (!factorize(size, known)) return 0;
+    for (Py_ssize_t i = 0; i < n; i++) {
+        for (Py_ssize_t a = 0; a < size; a++) gains[i * size + a] *= fused[a] != 0;
+        solve(size, known, gains + i * size);
+    }
+    memcpy(offset, s->offset + g * n, n * sizeof(double));
+    memcpy(loading, s->loading + g * n * w, n * w * sizeof(double));
+    memset(kept, 0, n * n * sizeof(double));
+    for (Py_ssize_t i = 0; i < n; i++) {
+        kept[i * n + i] = 1;
+        for (Py_ssize_t a = 0; a < size; a++) {
+            if (!fused[a]) continue;
+            const double gain = gains[i * size + a];
+            offset[i] += gain * s->errors[g * size + a];
+            add_multiple(loading + i * w, -gain, s->looks + (g * size + a) * w, w);
+            add_multiple(kept + i * n, -gain, sensors + a * n, n);
+        }
+    }
+    multiply(n, n, n, kept, s->spread + g * n * n, product);
+    memset(spread, 0, n * n * sizeof(double));
+    multiply_transposed(n, n, n, product, kept, spread);
+    multiply(n, size, size, gains, s->noise + g * size * size, noisy);
+    multiply_transposed(n, size, n, noisy, gains, spread);
+    multiply(n, n, 1, transition, offset, s->next_offset + g * n);
+    multiply(n, n, w, transition, loading, s->next_loading + g * n * w);
+    multiply(n, n, n, transition, spread, product);
+    memcpy(s->next_spread + g * n * n, s->driven + g * n * n, n * n * sizeof(double));
+    multiply_transposed(n, n, n, product, transition, s->next_spread + g * n * n);
+    return 1;
+}
+
+/* Moments of the states one step ahead: of the covariance the blocks along the diagonal. */
+INLINE void expect_group(const Augmented *s, Py_ssize_t g)
+{
+    const Py_ssize_t n = s->n_states, w = s->width, b = s->block;
+    const double *own = s->next_covariance + g * w * (s->n_latent + 1), *spread = s->next_spread + g * n * n;
+    double *designs = s->some, *shown = designs + n * w;
+    memcpy(designs, s->next_designs + g * n * w, n * w * sizeof(double));
+    add_multiple(designs, 1.0, s->next_loading + g * n * w, n * w);
+    triangle_times(w, n, own, s->n_latent, designs, shown, w);
+    for (Py_ssize_t i = 0; i < n; i++) {
+        double *row = s->state_covariances + (g * n + i) * b;
+        s->states[g * n + i] = s->next_path[g * n + i] + s->next_offset[g * n + i] + dot(designs + i * w, s->next_mean + g * w, w);
+        for (Py_ssize_t j = 0; j <= i % b; j++) {
+            const Py_ssize_t other = i - i % b + j;
+            const double value = dot(shown + i * w, designs + other * w, w);
+            row[j] = value + spread[i * n + other];
+            if (other < i) s->state_covariances[(g * n + other) * b + i % b] = value + spread[other * n + i];
+        }
+    }
+}
+
+static int augmented_all(const Augmented *s)
+{
+    for (Py_ssize_t g = 0; g < s->n_groups; g++) look_at_group(s, g);
+    spread_looks(s);
+    if (!compare_outputs(s)) return 0;
+    whiten_tick(s);
+    share_density(s);
+    know_more(s);
+    for (Py_ssize_t g = 0; g < s->n_groups; g++) {
+        if (!move_group(s, g)) return 0;
+        expect_group(s, g);
+    }
+    return 1;
 }
 
 #endif

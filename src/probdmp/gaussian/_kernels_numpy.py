@@ -8,6 +8,7 @@ All arrays are float64 and C-contiguous; the last arguments are written to. NaN 
 import numpy as np
 
 from probdmp.checks import LARGEST_MAGNITUDE, FloatArray, is_plain
+from probdmp.gaussian._augmented_numpy import augmented_step
 from probdmp.gaussian._recordings_numpy import (
     least_squares,
     plain_recordings,
@@ -21,6 +22,7 @@ from probdmp.gaussian._recordings_numpy import (
 
 __all__ = [
     "PreparedSteps",
+    "augmented_step",
     "filter_systems",
     "least_squares",
     "plain_recordings",

@@ -11,9 +11,8 @@ __all__ = ["block_diagonal", "couple_systems"]
 def block_diagonal(blocks: FloatArray) -> FloatArray:
     """Blocks (*batch, G, a, b) along the diagonal of a matrix, (*batch, G a, G b)."""
     *batch, n_groups, rows, columns = blocks.shape
-    own = np.arange(n_groups)
     whole = np.zeros((*batch, n_groups, rows, n_groups, columns))
-    whole[..., own, :, own, :] = np.moveaxis(blocks, -3, 0)  # indices apart from each other go to the front
+    np.einsum("...gagb->...gab", whole)[...] = blocks  # a view of the diagonal
     return whole.reshape(*batch, n_groups * rows, n_groups * columns)
 
 

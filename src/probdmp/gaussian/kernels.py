@@ -17,6 +17,7 @@ __all__ = [
     "LANE",
     "MOST_STATES",
     "PreparedSteps",
+    "augmented_step",
     "filter_systems",
     "in_threads",
     "least_squares",
@@ -73,6 +74,7 @@ whiten: Callable[..., bool] = _kernels.whiten
 window_sums: Callable[..., None] = _kernels.window_sums
 plain_recordings: Callable[..., None] = _kernels.plain_recordings
 points_on_lines: Callable[..., None] = _kernels.points_on_lines
+augmented_step: Callable[..., int] = _kernels.augmented_step
 split_sums = _kernels_numpy.split_sums
 
 
