@@ -90,7 +90,7 @@ def test_bands_of_joints_hold_what_they_say(joints, linearization, std, n):
 
 def test_bands_in_hindsight_do_so_too(joints):
     array = SensorArray(joints, [planar_arm_sensor("camera", LINKS, 0.01)])
-    tasks, states, recordings = executions(joints, array, 30)
+    tasks, states, recordings = executions(joints, array, 90)
     smoothed, filtered = (run(joints, tasks, recordings, array) for run in (smooth_recordings, filter_recordings))
     near, far = shares(states, smoothed)
     assert near == pytest.approx(0.95, abs=0.02)
