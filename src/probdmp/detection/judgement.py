@@ -127,7 +127,8 @@ def _needed(standard: Standard, highest: FloatArray) -> FloatArray:
     """What evidence (C, N) has to be above to be as surprising as the highest so far, or to raise an alarm."""
     calibration = standard.calibration
     known, values = np.flatnonzero(~np.isnan(highest).all(axis=1)).tolist(), as_values(highest)
-    reached = np.max([calibration.surprise_of(channel, values[channel]) for channel in known], axis=0)
+    nothing = np.zeros(highest.shape[1])
+    reached = np.max([nothing, *(calibration.surprise_of(channel, values[channel]) for channel in known)], axis=0)
     least = as_evidence(calibration.least_values(np.minimum(reached, standard.threshold)).T)
     return np.nextafter(least, -np.inf)
 

@@ -129,7 +129,7 @@ class TrajectoryModel:
         highest = np.full((len(values), len(counts)), np.nan)
         for channel, _ in self._plain:
             values[channel, is_over] = np.nan
-            highest[channel] = np.fmax.reduce(values[channel])
+            highest[channel] = np.fmax.reduce(values[channel], initial=np.nan)
         least = floors(highest)
         for evidence, horizons in self._questions:
             wanted = np.maximum(min(length, evidence.last + 1) - np.array(evidence.horizons), 0)
