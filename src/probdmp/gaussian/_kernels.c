@@ -226,6 +226,7 @@ typedef struct {
 #define where_above NAMED(where_above)
 #define step_lane NAMED(step_lane)
 #define store NAMED(store)
+#define everywhere NAMED(everywhere)
 #define times NAMED(times)
 #define plus_number NAMED(plus_number)
 #define smaller NAMED(smaller)
@@ -1090,6 +1091,13 @@ INLINE void store(double *to, Lane x)
     UNROLL for (int i = 0; i < PARTS; i++) ((Anywhere *)to)[i] = x.part[i];
 }
 
+INLINE Lane everywhere(double number)
+{
+    Lane x;
+    UNROLL for (int i = 0; i < PARTS; i++) x.part[i] = (Vector){0} + number;
+    return x;
+}
+
 INLINE Lane times(double factor, Lane x)
 {
     UNROLL for (int i = 0; i < PARTS; i++) x.part[i] = factor * x.part[i];
@@ -1220,7 +1228,7 @@ INLINE void step_lane(int n, Py_ssize_t stride, const double *system, const doub
     Lane a[MOST_STATES * MOST_STATES], c[MOST_STATES], m[MOST_STATES], v[MOST_STATES * MOST_STATES], gain[MOST_STATES];
     Lane kept[MOST_STATES * MOST_STATES], product[MOST_STATES * MOST_STATES], spread[MOST_STATES];
     const double *b = system + n * n * stride, *drift = inputs;
-    const Lane r = load(b + 2 * n * stride), zero = times(0.0, r), u = load(inputs + n * stride);
+    const Lane r = load(b + 2 * n * stride), zero = everywhere(0.0), u = load(inputs + n * stride);
     Lane e = observed, s = r;
     UNROLL for (int i = 0; i < n; i++) {
         m[i] = load(before + i * stride);
@@ -1575,7 +1583,7 @@ INLINE const double *square_outputs(const Windows *s, const double *packed, cons
 {
     Py_ssize_t account = 0;
     for (Py_ssize_t g = 0; g < n_groups; g++) {
-        const Lane zero = times(0.0, load(s->window));
+        const Lane zero = everywhere(0.0);
         Lane sum[OUTPUTS] = {zero, zero, zero, zero};
         for (Py_ssize_t c = 0; c < extents[g]; c++, packed += OUTPUTS) {
             const Lane x = load(s->window + c * WIDTH);
@@ -1603,7 +1611,7 @@ INLINE const double *square_next(const Windows *s, Py_ssize_t j, const double *p
 /* ln sum_a (scale_a (1 + square_a / freedom))^-(n_halves / 2); powers by squaring. */
 INLINE Lane mix_lane(const Windows *s, const double *scales, Py_ssize_t n_halves)
 {
-    const Lane zero = times(0.0, load(s->window)), one = plus_number(zero, 1.0);
+    const Lane zero = everywhere(0.0), one = everywhere(1.0);
     Lane least = plus_number(zero, INFINITY), total = zero;
     for (Py_ssize_t a = 0; a < s->n_accounts; a++)
         least = smaller(plus_number(times(scales[a] * s->inverse, load(s->sums + a * WIDTH)), scales[a]), least);
@@ -1704,7 +1712,7 @@ INLINE void weigh_rest(const Windows *s, const Contrary *c, Lane before, Py_ssiz
     const double *scales = s->scales + mapped * s->n_sums * a, *floors = c->floors + first, *packed = s->own;
     const int64_t *extents = s->own_extents;
     double *totals = s->more, *others = totals + c->n_dof * WIDTH, *most = others + s->n_sums * WIDTH, own[WIDTH] = {0};
-    const Lane zero = times(0.0, before), nothing = plus_number(zero, -INFINITY);
+    const Lane zero = everywhere(0.0), nothing = everywhere(-INFINITY);
     Lane square = zero;
     Py_ssize_t n_ends = 1, n_asked = 0;
     gather(s, place, first, width);
@@ -1763,7 +1771,7 @@ INLINE void weigh_windows(const Windows *s, const Contrary *c, Py_ssize_t place,
         packed = square_next(other, j, packed, &extents, b, other->sums);
         most = mix_lane(other, other_scales, n_halves);
         if (!any_above(plus(most, -1.0, least), floor)) {
-            put(found + place * s->n + first, plus_number(times(0.0, load(s->window)), -INFINITY), width);
+            put(found + place * s->n + first, everywhere(-INFINITY), width);
             return;
         }
     }
@@ -1844,7 +1852,7 @@ static void square_window(const OneWindow *s, double *sums)
 /* L and L^-1 r of WIDTH matrices L L^T, row by row, in place: of the lower triangle, and of r. */
 INLINE void factorise_lane(Py_ssize_t n, double *triangle, double *residual)
 {
-    const Lane zero = times(0.0, load(residual)), one = plus_number(zero, 1.0);
+    const Lane zero = everywhere(0.0), one = everywhere(1.0);
     for (Py_ssize_t i = 0; i <= n; i++) { /* r is one more row */
         double *row = i < n ? triangle + i * (i + 1) / 2 * WIDTH : residual;
         for (Py_ssize_t j = 0; j < (i < n ? i : n); j++) {
