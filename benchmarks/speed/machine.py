@@ -13,7 +13,7 @@ import numpy as np
 
 from probdmp.checks import FloatArray
 
-__all__ = ["CORES", "PEERS", "cores", "described", "empty_call", "in_step", "read_all", "versions"]
+__all__ = ["CORES", "PEERS", "cores", "described", "empty_call", "in_step", "multiplied", "read_all", "versions"]
 
 CORES: list[int] = sorted(os.sched_getaffinity(0))
 PEERS = ("statsmodels", "dynamax", "filterpy", "pykalman", "simdkalman", "movement_primitives", "pydmps")
@@ -82,6 +82,13 @@ def empty_call() -> float:
         pass
 
     return min(in_step(nothing, 100_000) for _ in range(20)) / 100_000
+
+
+def multiplied() -> float:
+    """Multiply-adds a second of a core, in products of matrices: what other guests of a virtual machine's host leave of it."""
+    a, b = np.random.default_rng(0).normal(size=(2, 512, 512))
+    seconds = [in_step(lambda: a @ b, 1) for _ in range(60)]
+    return float(a.size * len(b) / np.median(seconds))
 
 
 def _processor() -> str:
