@@ -79,22 +79,22 @@ class Job(NamedTuple):
 
 def no_channels(prefix: str) -> None:
     """Channels that never have evidence."""
-    values = trajectory_model.TrajectoryModel.values
-    muted = [c for c, name in enumerate(trajectory_model.CHANNELS) if name.startswith(prefix)]
+    evidence = trajectory_model.TrajectoryModel.evidence
+    muted = [c for c, name in enumerate(trajectory_model.MOVEMENT_CHANNELS) if name.startswith(prefix)]
     assert muted, prefix
 
     def without(self, *arguments):  # type: ignore[no-untyped-def]
-        found = values(self, *arguments)
-        found[..., muted] = np.nan
+        found = evidence(self, *arguments)
+        found[muted] = np.nan
         return found
 
-    trajectory_model.TrajectoryModel.values = without
+    trajectory_model.TrajectoryModel.evidence = without
 
 
 def no_self_normalisation() -> None:
     """Displacements are not compared with those of the same execution before."""
-    assert callable(trajectory_model.relative_to_sloppiness)
-    trajectory_model.relative_to_sloppiness = lambda squares: squares
+    assert callable(trajectory_model.relative_over_time)
+    trajectory_model.relative_over_time = lambda squares: squares
 
 
 def no_shifts() -> None:

@@ -459,6 +459,32 @@ def test_an_account_that_is_not_there_is_refused(central):
 
 
 @needs_extension
+def test_ratios_are_written_where_they_are_wanted_and_nowhere_else():
+    ends, wanted, one = np.array([1, 2]), np.array([6, 1]), np.ones(2, dtype=np.int64)
+    rows, which, maps, scales = (
+        np.zeros((6, 2), dtype=np.int64),
+        np.zeros((1, 1), dtype=np.int64),
+        np.ones((1, 2, 2)),
+        np.ones((1, 2, 1)),
+    )
+    found = np.full(9, -7.0)
+    arguments = np.ones((1, 3)), rows, maps, which, ends, one, wanted, scales, one
+    _compiled().window_ratios(*arguments, maps, which, one, scales, np.full(3, -np.inf), found[:3], 4.0, 0)
+    assert np.all(found[:3] == 0) and np.all(found[3:] == -7)
+    nothing = np.zeros(0, dtype=np.int64)
+    arguments = np.ones((1, 3)), rows, maps, which, nothing, one, nothing, np.ones((1, 0, 1)), nothing
+    with pytest.raises(ValueError, match="do not belong together"):
+        _compiled().window_ratios(*arguments, maps, which, one, np.ones((1, 0, 1)), np.zeros(3), np.zeros(0), 4.0, 0)
+
+
+@needs_extension
+def test_series_of_no_degree_of_freedom_are_refused():
+    shapes = (5, 0, 2, 2), (5, 0, 2), (0, 2), (5, 0), (3, 5, 0), (1, 5, 0), (3, 0)
+    with pytest.raises(ValueError, match="at least one degree of freedom"):
+        _compiled().squared_innovations(*(np.ones(shape) for shape in shapes))
+
+
+@needs_extension
 @pytest.mark.parametrize("fault", ["stds", "no stds", "ends", "inputs", "constants", "floors"])
 def test_rest_that_does_not_belong_to_windows_is_refused(fault):
     values, maps = np.ones((5, 3)), np.ones((2, 4, 5))

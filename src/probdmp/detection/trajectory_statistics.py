@@ -22,7 +22,6 @@ __all__ = [
     "Displacement",
     "Position",
     "relative_over_time",
-    "relative_to_sloppiness",
     "sloppiness",
 ]
 
@@ -106,13 +105,8 @@ def sloppiness(total: FloatArray | float, count: FloatArray | float) -> FloatArr
     return np.asarray((ORDINARY_TICKS * ORDINARY_SQUARE + total) / (ORDINARY_TICKS + count) / ORDINARY_SQUARE)
 
 
-def relative_to_sloppiness(squares: FloatArray) -> FloatArray:
-    """Squared displacements relative to those that the same execution had shown before the window, (n, T)."""
-    return relative_over_time(squares.T).T
-
-
 def relative_over_time(squares: FloatArray) -> FloatArray:
-    """The same of squared displacements (T, n)."""
+    """Squared displacements (T, n) relative to those that the same execution had shown before the window."""
     before = squares[:-SLOPPINESS_DELAY]
     unseen = np.isnan(before)
     if unseen.any():

@@ -11,9 +11,9 @@ from math import erfc, sqrt
 
 import numpy as np
 
-from probdmp.checks import FloatArray
+from probdmp.checks import FloatArray, frozen
 
-__all__ = ["REPORTED_GATE", "gate_ratios"]
+__all__ = ["REPORTED_GATE", "gate_limits", "gate_ratios"]
 
 REPORTED_GATE = 5.0
 """Standard deviations to which readings are compared for reports where a sensor has no gate."""
@@ -32,14 +32,18 @@ def gate_ratios(innovations: FloatArray, covariances: FloatArray, gate: float | 
     known = np.where(seen[..., :, None] & seen[..., None, :], covariances, np.eye(seen.shape[-1]))
     residual = np.where(seen, innovations, 0.0)
     squares = np.sum(residual * np.linalg.solve(known, residual[..., None])[..., 0], axis=-1)
-    limits = np.array([_limit(REPORTED_GATE if gate is None else gate, n) for n in range(seen.shape[-1] + 1)])
+    limits = gate_limits(REPORTED_GATE if gate is None else gate, seen.shape[-1])
     counts = seen.sum(axis=-1)
     return np.where(counts > 0, squares / limits[counts], np.nan)
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=64)
+def gate_limits(gate: float, n_outputs: int) -> FloatArray:
+    """Squared lengths that 0, 1, …, n standard normal numbers exceed as rarely as one exceeds `gate` in either direction."""
+    return frozen(np.array([_limit(gate, n) for n in range(n_outputs + 1)]))
+
+
 def _limit(gate: float, n_numbers: int) -> float:
-    """Squared length that n standard normal numbers exceed as rarely as one exceeds `gate` in either direction."""
     if n_numbers <= 1:
         return gate**2
     from scipy.special import gammainccinv

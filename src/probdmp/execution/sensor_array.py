@@ -14,7 +14,7 @@ from probdmp.checks import BoolArray, FloatArray, IntArray, check_array, check_c
 from probdmp.dmp import Primitive
 from probdmp.dmp.transformation_system import POSITION
 from probdmp.errors import InputError, InputTypeError
-from probdmp.execution.gating import gate_ratios
+from probdmp.execution.gating import gate_limits, gate_ratios
 from probdmp.execution.sensors import STATES, ChannelSensor, LinearSensor, NonlinearSensor, Sensor, default_sensors
 from probdmp.gaussian import AffineObservation, Linearization, linearize_extended, linearize_unscented, wrapped
 
@@ -65,6 +65,9 @@ class SensorArray:
         """R, (O, O), with ones where it is infinite."""
         self._nonlinear = [sensor for sensor in self.sensors if isinstance(sensor, NonlinearSensor)]
         self._gated = [sensor for sensor in self.sensors if sensor.gate is not None]
+        for sensor in self.sensors:
+            if sensor.gate is not None:  # loads what it takes now, not in a control loop
+                gate_limits(sensor.gate, len(sensor.outputs))
         self._group()
         self._find_signals()
         self.scales = self._output_scales(primitive)

@@ -4,7 +4,7 @@
 
    _kernels_numpy.py says the same in NumPy, function by function, and is what this file is tested against; kernels.py chooses
    between the two. Arrays are float64 and C-contiguous; what is written to is allocated by the caller. NaN marks what was not
-   observed. Functions release the GIL. Limited API of Python 3.11.
+   observed. Functions of many systems, series or windows release the GIL, those of one tick keep it. Limited API of Python 3.11.
 
    The file includes itself for its loops, which are compiled for any processor, and for those with AVX2, which is chosen at run
    time: NAMED says which of the two.
@@ -501,6 +501,10 @@ static int series_fit(const Array *x, Series *s, Py_ssize_t *n_states)
     const Py_ssize_t n_paths = x[5].view.shape[0];
     *s = (Series){count, t, d, n_paths, x[0].data, x[1].data, x[2].data, x[3].data, x[4].data, x[5].data};
     *n_states = n;
+    if (d < 1) {
+        PyErr_SetString(PyExc_ValueError, "expected at least one degree of freedom, got none");
+        return 0;
+    }
     return few_states(n) && agree(&x[0], "closed_loop", t, d, n, n) && agree(&x[1], "feedback", t, d, n, 0)
            && agree(&x[2], "sensor", d, n, 0, 0) && agree(&x[3], "precisions", t, d, 0, 0)
            && agree(&x[5], "paths", n_paths == 1 ? 1 : count, t, d, 0);
@@ -605,7 +609,7 @@ static int windows_fit(const Array *x, Py_ssize_t n_found, Py_ssize_t n_left_out
     if (!agree(&x[2], "maps", s->n_maps, s->n_outputs, s->n_inputs, 0) || !agree(&x[5], "reach", s->n_outputs, 0, 0, 0)
         || !agree(&x[6], "wanted", s->n_sums, 0, 0, 0))
         return 0;
-    int is_sound = s->n_sums > n_left_out && s->n_mapped > 0 && s->n_inputs > 0 && s->n_accounts > 0;
+    int is_sound = s->n_sums > 0 && s->n_sums > n_left_out && s->n_mapped > 0 && s->n_inputs > 0 && s->n_accounts > 0;
     Py_ssize_t size = 0;
     for (Py_ssize_t j = 0; is_sound && j < s->n_sums; j++) {
         is_sound = s->ends[j] > (j ? s->ends[j - 1] : 0) && s->ends[j] <= s->n_outputs && s->wanted[j] >= 0
@@ -1801,7 +1805,8 @@ static void look_at_windows(const Windows *s, double *found)
 
 static void weigh_all(const Windows *s, const Contrary *c, double *found)
 {
-    for (Py_ssize_t place = 0; place < s->wanted[0]; place++) {
+    const Py_ssize_t n_places = s->wanted[c->windows ? s->n_sums - 1 : 0];
+    for (Py_ssize_t place = 0; place < n_places; place++) {
         pack_place(s, place, 1);
         if (c->windows) pack_place(c->windows, place, 0);
         memset(s->sums, 0, s->n_accounts * WIDTH * sizeof(double));

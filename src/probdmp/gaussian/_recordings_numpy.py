@@ -186,7 +186,7 @@ def window_evidence(
         own = moved[: len(some), :n_points]
         squares = np.sum(own * own, axis=1) - np.sum(own, axis=1) ** 2 / (n_points + 1)
         some[:] = constant - squares.sum(axis=1) / 2 + here[: len(some)] - mixed
-        some[some <= floor] = -np.inf
+        some[~(some > floor)] = -np.inf
 
 
 def window_ratios(
@@ -226,7 +226,7 @@ def window_ratios(
         )
     )
     np.subtract(other, together, out=ratios)
-    ratios[ratios <= floors] = -np.inf
+    ratios[~(ratios > floors)] = -np.inf
 
 
 def whiten(covariances: FloatArray, residuals: FloatArray, white: FloatArray, diagonals: FloatArray) -> bool:
