@@ -470,7 +470,8 @@ def test_ratios_are_written_where_they_are_wanted_and_nowhere_else():
     found = np.full(9, -7.0)
     arguments = np.ones((1, 3)), rows, maps, which, ends, one, wanted, scales, one
     _compiled().window_ratios(*arguments, maps, which, one, scales, np.full(3, -np.inf), found[:3], 4.0, 0)
-    assert np.all(found[:3] == 0) and np.all(found[3:] == -7)
+    assert np.all(found[:3] == 0)
+    assert np.all(found[3:] == -7)
     nothing = np.zeros(0, dtype=np.int64)
     arguments = np.ones((1, 3)), rows, maps, which, nothing, one, nothing, np.ones((1, 0, 1)), nothing
     with pytest.raises(ValueError, match="do not belong together"):
