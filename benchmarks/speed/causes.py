@@ -57,9 +57,9 @@ CAUSES = {
     ),
     "fleet": (
         "of one thread (`python benchmarks/fleet_scoring.py 60000 --profile`, on the machine above) 35 % are the windows of "
-        "the trajectory, 16 % the log-likelihood, 15 % the reasons of the 3 % that failed, 11 % reading, the rest is in small "
-        "parts; "
-        "two threads take more of the processors' time than one"
+        "the trajectory, 14 % reading, 14 % the reasons of the 3 % that failed, 12 % the log-likelihood, 10 % when it was most "
+        "surprising, the rest is in small parts; and the cores of this virtual machine differ by a factor of two from hour to "
+        "hour, see how fast they were"
     ),
 }
 """In words, by how the name of a row begins."""
