@@ -130,6 +130,13 @@ def test_ticks_are_those_of_the_recording(seed, coupling, channels, gap):
         np.testing.assert_allclose(tick.innovations, expected.innovations[t, 0], rtol=1e-7, atol=1e-9 * array.scales.max())
         np.testing.assert_allclose(tick.innovation_covariance, expected.innovation_covariances[t, 0], rtol=1e-8, atol=1e-15)
         np.testing.assert_allclose(tick.contributions, expected.log_likelihoods[t, 0], rtol=1e-6, atol=1e-6)
+        if t in (0, chunk - 1, chunk, len(readings) - 2):  # the state of the next tick, of which nothing was measured yet
+            so_far = {name: np.where(np.arange(len(readings))[:, None] <= t, own, np.nan) for name, own in names.items()}
+            ahead = filter_recordings(primitive, [task], [recording_of_readings(array, so_far, DT)], array).filtered
+            mean, covariance = ahead.means[t + 1, 0], ahead.covariances[t + 1, 0]
+            scale = np.abs(mean).max(axis=0) + np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)).max(axis=0)
+            assert np.all(np.abs(tick.mean - mean) <= 1e-8 * scale)
+            np.testing.assert_allclose(tick.covariance, covariance, rtol=1e-8, atol=1e-12)
 
 
 def test_schedules_are_kept():

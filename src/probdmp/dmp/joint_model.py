@@ -265,7 +265,10 @@ def _lessons(
 def _kept_lessons(primitive: Primitive, shape: tuple[int, ...], end_rows: bytes, *kinds: bytes) -> _Lessons:
     """The same from bytes, by which they are found again: executions often differ in nothing but their values."""
     masks = (np.frombuffer(kind, dtype=np.bool_).reshape(*shape[:-1], -1) for kind in kinds)
-    return _lessons(primitive, np.frombuffer(end_rows).reshape(shape), *masks)
+    lessons = _lessons(primitive, np.frombuffer(end_rows).reshape(shape), *masks)
+    for array in (lessons.factors, lessons.covariance):  # they are in the model of every execution of the kind
+        array.setflags(write=False)
+    return lessons
 
 
 def _told(model: JointModel, lesson: _Lesson, deltas: FloatArray, column: int, handling: str) -> JointModel:

@@ -19,6 +19,7 @@ from probdmp.dmp import Primitive, Task
 from probdmp.dmp.joint_model import joint_executions
 from probdmp.execution.joint_steps import JointSystem
 from probdmp.execution.kept import Kept
+from probdmp.execution.plans import kind_of_task
 from probdmp.execution.sensor_array import SensorArray
 from probdmp.gaussian import AffineObservation, AugmentedTick, augmented_tick, block_diagonal, no_observations
 from probdmp.gaussian.density import log_density_shares
@@ -97,9 +98,8 @@ def gain_schedule(primitive: Primitive, task: Task, dt: float, array: SensorArra
 
 def kind_of(primitive: Primitive, task: Task, dt: float, array: SensorArray) -> tuple[Hashable, ...]:
     """What executions have in common that share their gains; arguments as above."""
-    told = [np.isnan(part).tobytes() for part in (task.start, task.goal, task.start_velocity) if part is not None]
     sensors = (array.dense_matrix.tobytes(), array.covariance.tobytes(), array.silent.tobytes())
-    return primitive.identity, float(task.duration[0]), dt, *told, *sensors
+    return *kind_of_task(primitive, task, dt), *sensors
 
 
 def _computed(primitive: Primitive, task: Task, dt: float, array: SensorArray, seen: BoolArray) -> GainSchedule:

@@ -1,11 +1,20 @@
 """What is expected of executions before anything is measured."""
 
+from collections.abc import Hashable
+
 import numpy as np
 
 from probdmp.checks import FloatArray
+from probdmp.dmp import Primitive, Task
 from probdmp.dmp.joint_model import JointExecutions
 
-__all__ = ["planned_outputs", "planned_states"]
+__all__ = ["kind_of_task", "planned_outputs", "planned_states"]
+
+
+def kind_of_task(primitive: Primitive, task: Task, dt: float) -> tuple[Hashable, ...]:
+    """What executions have in common that are equally uncertain before anything is measured; task may have a batch axis."""
+    told = [np.isnan(part).tobytes() for part in (task.start, task.goal, task.start_velocity) if part is not None]
+    return primitive.identity, float(task.duration[0]), dt, *told
 
 
 def planned_states(executions: JointExecutions) -> FloatArray:

@@ -4,17 +4,14 @@ How uncertain a movement is follows from the primitive, its duration, the step, 
 not from their values.
 """
 
-from collections.abc import Hashable
 from dataclasses import dataclass
-
-import numpy as np
 
 from probdmp.checks import FloatArray, freeze_arrays
 from probdmp.dmp import Primitive, Task
 from probdmp.dmp.joint_model import JointExecutions
 from probdmp.execution.joint_filtering import joint_covariances
 from probdmp.execution.kept import Kept
-from probdmp.execution.plans import planned_states
+from probdmp.execution.plans import kind_of_task, planned_states
 from probdmp.gaussian import GaussianSequence
 
 __all__ = ["roll_out_joint"]
@@ -49,11 +46,6 @@ def roll_out_joint(primitive: Primitive, tasks: Task, dt: float, executions: Joi
     ----------
     executions : its own, before anything was seen.
     """
-    key = _kind(primitive, tasks, dt, len(executions.rows))
+    key = (*kind_of_task(primitive, tasks, dt), len(executions.rows))
     plan = _KEPT.get(key, lambda: RolloutPlan(joint_covariances(executions)))
     return GaussianSequence(planned_states(executions), plan.covariances)
-
-
-def _kind(primitive: Primitive, tasks: Task, dt: float, n_steps: int) -> tuple[Hashable, ...]:
-    told = [np.isnan(part).tobytes() for part in (tasks.start, tasks.goal, tasks.start_velocity) if part is not None]
-    return primitive.identity, float(tasks.duration[0]), dt, n_steps, *told

@@ -273,13 +273,11 @@ typedef struct {
 #define factorise_lane NAMED(factorise_lane)
 #define whiten_all NAMED(whiten_all)
 
-#define scalar_product NAMED(scalar_product)
 #define square_window NAMED(square_window)
 
 #define look_for_odd NAMED(look_for_odd)
 #define draw_lines NAMED(draw_lines)
 
-#define no_sum NAMED(no_sum)
 #define dot NAMED(dot)
 #define add_multiple NAMED(add_multiple)
 #define sum_of NAMED(sum_of)
@@ -1824,16 +1822,24 @@ static void weigh_all(const Windows *s, const Contrary *c, double *found)
 
 /* ---- One window --------------------------------------------------------------------------------------------------------- */
 
-INLINE double scalar_product(const double *x, const double *y, Py_ssize_t n)
+INLINE double sum_of(Lane x)
 {
-    double numbers[WIDTH] = {0}, product = 0;
-    Lane sum = load(numbers);
+#ifdef MASK
+    const Vector both = x.part[0] + x.part[1];
+    return (both[0] + both[2]) + (both[1] + both[3]);
+#else
+    return (x.part[0] + x.part[2]) + (x.part[1] + x.part[3]);
+#endif
+}
+
+INLINE double dot(const double *x, const double *y, Py_ssize_t n)
+{
+    Lane sums = everywhere(0.0);
     Py_ssize_t i = 0;
-    for (; i + WIDTH <= n; i += WIDTH) sum = plus_product(sum, load(x + i), load(y + i));
-    store(numbers, sum);
-    for (int w = 0; w < WIDTH; w++) product += numbers[w];
-    for (; i < n; i++) product += x[i] * y[i];
-    return product;
+    for (; i + WIDTH <= n; i += WIDTH) sums = plus_product(sums, load(x + i), load(y + i));
+    double total = sum_of(sums);
+    for (; i < n; i++) total += x[i] * y[i];
+    return total;
 }
 
 /* Sums (J, A) of the squares of the outputs from each end to the next; each depends on as many inputs as it reaches. */
@@ -1844,7 +1850,7 @@ static void square_window(const OneWindow *s, double *sums)
         for (Py_ssize_t j = 0; j < s->n_sums; j++) {
             double sum = 0;
             for (Py_ssize_t i = s->ends[j]; i < s->ends[j + 1]; i++) {
-                const double output = scalar_product(map + i * s->n_inputs, s->window, s->reach[i]);
+                const double output = dot(map + i * s->n_inputs, s->window, s->reach[i]);
                 sum += output * output;
             }
             sums[j * s->n_accounts + a] = sum;
@@ -1938,32 +1944,6 @@ static AS_WRITTEN void draw_lines(const Recordings *s, double *points)
 
 /* ---- What moves on top of a Gaussian that stands still ------------------------------------------------------------------ */
 
-INLINE Lane no_sum(void)
-{
-    const double none[WIDTH] = {0};
-    return load(none);
-}
-
-INLINE double sum_of(Lane x)
-{
-#ifdef MASK
-    const Vector both = x.part[0] + x.part[1];
-    return (both[0] + both[2]) + (both[1] + both[3]);
-#else
-    return (x.part[0] + x.part[2]) + (x.part[1] + x.part[3]);
-#endif
-}
-
-INLINE double dot(const double *x, const double *y, Py_ssize_t n)
-{
-    Lane sums = no_sum();
-    Py_ssize_t i = 0;
-    for (; i + WIDTH <= n; i += WIDTH) sums = plus_product(sums, load(x + i), load(y + i));
-    double total = sum_of(sums);
-    for (; i < n; i++) total += x[i] * y[i];
-    return total;
-}
-
 /* to += factor x */
 INLINE void add_multiple(double *to, double factor, const double *x, Py_ssize_t n)
 {
@@ -1976,7 +1956,7 @@ INLINE void add_multiple(double *to, double factor, const double *x, Py_ssize_t 
 INLINE void both_ways(const double *rows, Py_ssize_t stride, Py_ssize_t n_rows, Py_ssize_t n, const double *y,
                       const double *factors, double *to, double *sums)
 {
-    const Lane zero = no_sum();
+    const Lane zero = everywhere(0.0);
     Lane sum[ROWS] = {zero, zero, zero, zero};
     const double *row[ROWS];
     double factor[ROWS];
@@ -2187,7 +2167,7 @@ INLINE void know_more(const Augmented *s)
         const Py_ssize_t n_rows = r - i < ROWS ? r - i : ROWS;
         for (Py_ssize_t j = 0; j < i + n_rows; j += WIDTH) {
             const double *row = s->rows + i * q, *column = s->columns + j * q;
-            const Lane zero = no_sum();
+            const Lane zero = everywhere(0.0);
             Lane sum[ROWS] = {zero, zero, zero, zero};
             for (Py_ssize_t o = 0; o < q; o++, row += ROWS, column += WIDTH) {
                 const Lane some = load(column);
