@@ -131,7 +131,7 @@ def measured(command: list[str]) -> dict[str, Any]:
 def profiled(model: Path, executions: Path) -> list[str]:
     """Where the time of one thread goes, by stage, after what is computed once; lines of text."""
     scorer, file = Scorer(model.read_bytes(), model.name), ParquetExecutions(str(executions))
-    columns, parts = scorer.columns(file.layout, file.path), parts_of(file, file.executions())
+    columns, parts = scorer.columns(file.layout, file.path), parts_of(file, file.executions(labels=False))
     if len(parts) < 2:
         raise SystemExit(f"Expected executions for two parts or more, got {len(parts)}: ask for more of them.")
 

@@ -13,7 +13,8 @@ from probdmp.detection.library import own_tasks
 from probdmp.errors import DataFileError, InputError, MissingExtraError, ModelFileError
 from probdmp.execution import score_recordings
 from probdmp.fleet import score_executions
-from probdmp.io import parquet_executions
+from probdmp.fleet.plan import parts_of
+from probdmp.io import ParquetExecutions, parquet_executions
 
 
 def scored(model, executions, output=None, **options):
@@ -97,6 +98,16 @@ def test_neither_rows_nor_parts_nor_layouts_matter(fleet, write, monkeypatch, re
         assert_alike(rows(table), reference)
         assert summary.parts == (len(fleet.executions) if part == 1 else summary.parts)
         assert not list(path.parent.glob(".*.parts"))
+
+
+@pytest.mark.parametrize(("group", "sizes"), [(10, [30, 40, 30]), (50, [33, 33, 34]), (1000, [33, 33, 34])])
+def test_parts_end_with_row_groups_that_end_nearby(fleet, write, group, sizes):
+    """So that those are read once; and else where they should."""
+    executions = fleet.executions[:1] * 100
+    length = executions[0].n_samples
+    file = ParquetExecutions(write("many", rows_of(executions), row_group_size=group * length))
+    parts = parts_of(file, file.executions(labels=False), 33 * length)
+    assert [part.n_executions for part in parts] == sizes
 
 
 def test_the_order_is_that_of_the_input_and_names_go_through(fleet, write, reference):

@@ -1,6 +1,7 @@
 """Parquet files: what is written is read, both layouts say the same, and what cannot be used is refused by name."""
 
 import importlib.util
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -106,6 +107,28 @@ def test_both_layouts_say_the_same_however_rows_are_grouped(tmp_path, monkeypatc
         monkeypatch.setattr(parquet_executions, "PIECE", piece)
         assert_same_demonstrations(read_parquet(long), demonstrations)
         assert_same_demonstrations(read_parquet(dense), demonstrations)
+
+
+@pytest.mark.parametrize("rows", [rows_of, dense_rows_of])
+def test_executions_come_in_as_few_tables_as_memory_allows(tmp_path, monkeypatch, rows):
+    """About equally large ones, with the same in them; labels are numbered anew in each."""
+    demonstrations = [replace(one, label=label) for label in "cab" for one in three()]
+    columns = rows(demonstrations, ids=[f"e{k}" for k in range(9)])
+    file = ParquetExecutions(written(tmp_path / "nine.parquet", columns, row_group_size=2 if rows is dense_rows_of else 50))
+    starts = file.executions(labels=False).starts
+    span = Span(0, int(starts[-1]), None if file.layout.is_dense else np.diff(starts))
+    monkeypatch.setattr(parquet_executions, "PIECE", 40)
+    (whole,) = file.read(span, ["x", "y"])
+    monkeypatch.setattr(parquet_executions, "TABLE", len(whole.columns["x"]))
+    tables = list(file.read(span, ["x", "y"]))
+    assert max(map(len, tables)) < 9 == sum(map(len, tables))
+    assert 2 <= len(tables) <= 4
+    for name in ("x", "y"):
+        np.testing.assert_array_equal(np.concatenate([table.columns[name] for table in tables]), whole.columns[name])
+    for table in (whole, *tables):
+        names = [name.as_py() for name in table.ids]
+        assert [table.labels[code] for code in table.codes] == ["cab"[int(name[1:]) // 3] for name in names]
+        assert np.diff(table.offsets).tolist() == [three()[int(name[1:]) % 3].n_samples for name in names]
 
 
 def as_lists_of_times(columns, demonstrations):

@@ -71,7 +71,7 @@ class Calibration:
         self.false_alarm_rate, self.method = false_alarm_rate, method
         if len(self.maxima) < 2 or len(self.maxima) != len(self.labels):
             raise InputError("at least two calibration executions, each with a label", f"{len(self.maxima)}")
-        self._sorted = np.sort(self.maxima, axis=0)
+        self._sorted = np.ascontiguousarray(np.sort(self.maxima, axis=0).T)  # (C, n)
         self._handicaps = np.broadcast_to(handicaps, self.maxima.shape[1:])
         self._floors = np.broadcast_to(floors, self.maxima.shape[1:])
         least = np.maximum(self._floors, np.finfo(float).tiny)
@@ -80,8 +80,11 @@ class Calibration:
         excesses = np.where(beyond, np.log(np.maximum(self.maxima, self._starts) / self._starts), 0.0)
         self._exponents = (excesses.sum(axis=0) + TAIL_PRIOR_COUNT * TAIL_PRIOR) / (beyond.sum(axis=0) + TAIL_PRIOR_COUNT)
         self._tail_surprises = -np.log((beyond.sum(axis=0) + 1) / (self.n + 1))
+        by_rank = -np.log(np.arange(self.n + 1, 0, -1) / (self.n + 1))
+        self._by_rank = np.minimum(by_rank, self._tail_surprises[:, None])
+        """(C, n + 1) array: surprise of what exceeds so many of the maxima."""
         by_channel = self._starts, self._tail_surprises, self._exponents, self._handicaps
-        self._known = list(zip(self._sorted.T.tolist(), *(numbers.tolist() for numbers in by_channel), strict=True))
+        self._known = list(zip(self._sorted.tolist(), *(numbers.tolist() for numbers in by_channel), strict=True))
         """Of each channel, as `_surprise_now` takes it."""
         self.statistics = self.surprise(self.maxima).max(axis=-1)
         self.threshold, self.is_conformal = self._threshold()
@@ -141,9 +144,8 @@ class Calibration:
     def surprise_of(self, channel: int, values: FloatArray) -> FloatArray:
         """The same for values (…) of one channel."""
         start, tail_surprise = self._starts[channel], self._tail_surprises[channel]
-        filled = np.nan_to_num(values)
-        ranks = self.n - np.searchsorted(self._sorted[:, channel], filled, "left")
-        by_rank = np.minimum(-np.log((ranks + 1) / (self.n + 1)), tail_surprise)
+        filled = np.minimum(np.where(np.isnan(values), 0.0, values), np.finfo(float).max)
+        by_rank = self._by_rank[channel][np.searchsorted(self._sorted[channel], filled, "left")]
         tail = np.log(np.maximum(filled, start) / start) / self._exponents[channel]
         surprises = np.where(filled > start, tail_surprise + tail, by_rank)
         return np.asarray(np.maximum(surprises - self._handicaps[channel], 0.0))
@@ -155,7 +157,7 @@ class Calibration:
         # -ln ((ranks + 1) / (n + 1)) >= wanted
         ranks = np.floor((self.n + 1) * np.exp(-wanted) * (1 + ROUNDING)).astype(np.int64) - 1
         places = self.n - 1 - np.clip(ranks, 0, self.n - 1)
-        by_rank = np.take_along_axis(self._sorted, places.reshape(-1, places.shape[-1]), axis=0).reshape(places.shape)
+        by_rank = self._sorted[np.arange(len(self._sorted)), places]
         least = np.where(wanted > self._tail_surprises, tail, np.minimum(by_rank, self._starts))
         return np.where(ranks >= self.n, -np.inf, least)
 

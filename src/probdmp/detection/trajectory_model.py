@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from functools import cached_property
-from itertools import groupby
+from itertools import groupby, pairwise, starmap
 from operator import attrgetter
 from typing import Protocol
 
@@ -42,8 +42,8 @@ __all__ = [
 ]
 
 SIDE_BY_SIDE = 520
-"""Executions that are judged side by side: so many that calls do not count, so few that their numbers stay at hand. Not a power
-of two, or the numbers of one window would all compete for the same few places of the cache."""
+"""Executions that are judged side by side, about: so many that calls do not count, so few that their numbers stay at hand. Not
+a power of two, or the numbers of one window would all compete for the same few places of the cache."""
 
 
 Floors = Callable[[FloatArray], FloatArray]
@@ -108,18 +108,17 @@ class TrajectoryModel:
         floors : what evidence that weighs two accounts has to be above to matter; what is not may be -infinity.
         """
         n = paths.shape[-1]
-        evidence = np.empty((len(MOVEMENT_CHANNELS) + len(self.feel), len(paths), n))
-        for begin in range(0, n, SIDE_BY_SIDE):
-            part = slice(begin, begin + SIDE_BY_SIDE)
-            own = np.ascontiguousarray(paths[..., part])
-            evidence[..., part] = self._weigh(own, counts[part], goals[part], floors)
+        evidence = np.full((len(MOVEMENT_CHANNELS) + len(self.feel), len(paths), n), np.nan)
+        edges = np.linspace(0, n, max(round(n / SIDE_BY_SIDE), 1) + 1).astype(int).tolist()
+        for part in starmap(slice, pairwise(edges)):
+            self._weigh(paths[..., part], counts[part], goals[part], floors, evidence[..., part])
         return evidence
 
-    def _weigh(self, paths: FloatArray, counts: IntArray, goals: FloatArray, floors: Floors) -> FloatArray:
+    def _weigh(self, paths: FloatArray, counts: IntArray, goals: FloatArray, floors: Floors, values: FloatArray) -> None:
+        """The same of some of them, into values that are NaN."""
         unseen, length = np.asarray(np.isnan(paths)), len(paths)
         is_lossy, is_over = unseen.any(), np.arange(length)[:, None] >= counts
         inputs = WindowInputs.of(np.where(unseen, 0.0, paths) if is_lossy else paths, self._whole.ahead(goals).T)
-        values = np.full((len(MOVEMENT_CHANNELS) + len(self.feel), length, len(counts)), np.nan)
         means = self._whole.means_for(goals) if is_lossy else None
         for channel, statistic in self._plain:
             values[channel] = statistic.weigh(inputs, length)
@@ -139,7 +138,6 @@ class TrajectoryModel:
         if means is not None:
             self._weigh_again(values, paths, unseen, means)
         values[:, is_over] = np.nan
-        return values
 
     def _judge_again(self, values: FloatArray, paths: FloatArray, unseen: BoolArray, means: FloatArray) -> None:
         """Judge windows of which something was not seen by what was seen of them."""

@@ -68,12 +68,10 @@ class Scores:
         import pyarrow as pa
 
         table, scored, failed = self._table, self._scored, self._failed
-        ids = table.ids.combine_chunks() if isinstance(table.ids, pa.ChunkedArray) else table.ids
-        ids = ids.dictionary_decode() if pa.types.is_dictionary(ids.type) else ids
         verdicts = np.array(VERDICTS, dtype=object)[np.where(scored, failed.astype(int), 2)]
         numbers = self._numbers
         arrays = {
-            ID: ids,
+            ID: table.ids,
             LABEL: _texts(labels, np.array([label is None for label in labels.tolist()], dtype=bool)),
             "verdict": _texts(verdicts, np.zeros(len(verdicts), dtype=bool)),
             "alarm_time": pa.array(numbers["time"], mask=~failed),
@@ -85,7 +83,7 @@ class Scores:
             "n_samples": pa.array(table.counts),
             "error": _texts(table.problems, table.usable),
         }
-        return pa.Table.from_arrays(list(arrays.values()), schema=score_schema(ids.type))
+        return pa.Table.from_arrays(list(arrays.values()), schema=score_schema(table.ids.type))
 
 
 def _texts(values: NDArray[np.object_], missing: NDArray[np.bool_]) -> Any:

@@ -99,7 +99,7 @@ def score_executions(
     identity = {"schema": SCHEMA, "version": __version__, "model": scorer.digest, "executions": file.fingerprint}
     folder = PartsFolder(target, identity, part_samples, restart)
     try:
-        parts = parts_of(file, file.executions(), folder.samples)
+        parts = parts_of(file, file.executions(labels=False), folder.samples)
         done = folder.done()
         todo = [part for part in parts if part.number not in done]
         on_part(len(parts) - len(todo), len(parts))
@@ -149,6 +149,7 @@ def _put_together(
 
 def _counted(table: Any) -> Iterator[tuple[str, str, int]]:
     (labels, names), (verdicts, kinds) = codes_of(table[LABEL]), codes_of(table["verdict"])
-    pairs, counts = np.unique(np.stack([labels, verdicts]), axis=1, return_counts=True)
-    for (label, verdict), count in zip(pairs.T.tolist(), counts.tolist(), strict=True):
+    pairs, counts = np.unique(labels.astype(np.int64) * len(kinds) + verdicts, return_counts=True)
+    for pair, count in zip(pairs.tolist(), counts.tolist(), strict=True):
+        label, verdict = divmod(pair, len(kinds))
         yield ("" if label < 0 else names[label]), kinds[verdict], count

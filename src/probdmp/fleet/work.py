@@ -68,13 +68,13 @@ class Worker:
         self._columns = self._scorer.columns(self._file.layout, self._file.path)
 
     def scores(self, parts: Iterable[Part]) -> Iterator[tuple[int, bytes]]:
-        """Of each part its index and its scores, a Parquet file; the next executions are read meanwhile."""
+        """Of each part its index and its scores, a Parquet file; the next part is scored meanwhile, and that after it read."""
         from threadpoolctl import threadpool_limits
 
         pieces = _ahead((part, table) for part in parts for table in self._file.read(part.span, self._columns))
+        groups = itertools.groupby(pieces, key=lambda piece: piece[0].number)
         with threadpool_limits(1, "blas"):  # threads share executions; those of the linear algebra would be in their way
-            for _, group in itertools.groupby(pieces, key=lambda piece: piece[0].number):
-                of_part = list(self._scored(group))
+            for of_part in _ahead(list(self._scored(group)) for _, group in groups):
                 yield of_part[0][0].number, _payload([table for _, table in of_part])
 
     def _scored(self, pieces: Iterable[tuple[Part, ExecutionTable]]) -> Iterator[tuple[Part, Any]]:

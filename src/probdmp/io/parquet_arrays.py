@@ -1,5 +1,6 @@
 """Columns of a Parquet file as NumPy arrays."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -7,7 +8,7 @@ from numpy.typing import NDArray
 
 from probdmp.checks import BoolArray, FloatArray, IntArray
 
-__all__ = ["codes_of", "list_lengths", "numbers_of", "seconds_of", "steady", "told_once"]
+__all__ = ["codes_of", "list_lengths", "numbers_of", "plain_names", "recoded", "seconds_of", "steady", "told_once"]
 
 PER_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 
@@ -58,6 +59,19 @@ def codes_of(column: Any) -> tuple[NDArray[np.signedinteger[Any]], list[str]]:
         array = pc.dictionary_encode(array)
     codes = pc.fill_null(array.indices, -1) if array.indices.null_count else array.indices
     return codes.to_numpy(zero_copy_only=False), array.dictionary.to_pylist()
+
+
+def recoded(codes: IntArray, texts: Sequence[str], known: dict[str, int]) -> IntArray:
+    """Numbers of texts, -1 for none, as numbers of all texts that are known, to which those of these are added."""
+    return np.array([*(known.setdefault(text, len(known)) for text in texts), -1], dtype=np.int64)[codes]
+
+
+def plain_names(column: Any) -> Any:
+    """A column of names as one Arrow array without a dictionary."""
+    import pyarrow as pa
+
+    array = column.combine_chunks() if isinstance(column, pa.ChunkedArray) else column
+    return array.dictionary_decode() if pa.types.is_dictionary(array.type) else array
 
 
 def steady(values: NDArray[Any], offsets: IntArray) -> BoolArray:

@@ -2,9 +2,10 @@
 
 import hashlib
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
+from math import ceil
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,14 +13,16 @@ import numpy as np
 from probdmp.checks import IntArray
 from probdmp.demonstrations.demonstration import LONGEST_RECORDING
 from probdmp.errors import DataFileError
-from probdmp.io.parquet_arrays import codes_of
+from probdmp.io.parquet_arrays import codes_of, plain_names, recoded
 from probdmp.io.parquet_layout import ID, LABEL, STEP, TIME, layout_of, open_parquet
-from probdmp.io.parquet_table import ExecutionTable, table_of_lists, table_of_samples
+from probdmp.io.parquet_table import ExecutionTable, joined, table_of_lists, table_of_samples
 
 __all__ = ["Executions", "ParquetExecutions", "Span"]
 
-PIECE = 2**21
-"""Samples that are read at a time, about."""
+PIECE = 2**18
+"""Samples that are read at a time, about: so few that their times and names stay at hand while they are looked at."""
+TABLE = 2**24
+"""Numbers that were measured in the executions that are handed over together, about."""
 FOOTER = 2**26
 """Bytes of the end of a file, at most, by which it is known again."""
 NONE_YET = object()
@@ -46,7 +49,7 @@ class Executions(NamedTuple):
     starts: IntArray
     """(N + 1,) array: execution i has the rows `starts[i]:starts[i + 1]`."""
     codes: IntArray
-    """(N,) array: which of `labels` each has; -1 for none."""
+    """(N,) array: which of `labels` each has; -1 for none, or where they were not read."""
     labels: list[str]
 
     def __len__(self) -> int:
@@ -97,8 +100,12 @@ class ParquetExecutions:
         most = sum(max(group.column(i).num_values for i in columns) for group in groups)
         return most / max(int(self.bounds[-1]), 1)
 
-    def executions(self) -> Executions:
+    def executions(self, labels: bool = True) -> Executions:
         """Where executions are: reads their names only.
+
+        Parameters
+        ----------
+        labels : whether what movement they are is read too.
 
         Raises
         ------
@@ -109,24 +116,24 @@ class ParquetExecutions:
 
         ids, starts, codes, names = [], [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)], dict[str, int]()
         previous: object = NONE_YET
-        columns = [ID, *([self.layout.label] if self.layout.label else [])]
+        label = self.layout.label if labels else None
+        columns = [ID, *([label] if label else [])]
         for first, batch in self._batches(0, int(self.bounds[-1]), columns, PIECE):
             begins = np.arange(len(batch)) if self.layout.is_dense else _begins(batch[ID], previous)
             previous = batch[ID][-1].as_py()
-            ids.append(_decoded(batch[ID].take(pa.array(begins))))
+            ids.append(plain_names(batch[ID].take(pa.array(begins))))
             starts.append(first + begins)
-            if self.layout.label:
-                own, texts = codes_of(batch[self.layout.label])
-                known = np.array([*(names.setdefault(text, len(names)) for text in texts), -1])
-                codes.append(known[own[begins]])
+            if label:
+                own, texts = codes_of(batch[label])
+                codes.append(recoded(own[begins], texts, names))
             self._check_together(sum(map(len, starts)), first + len(batch))
         every, n_rows = np.concatenate(starts), int(self.bounds[-1])
         kind = ids[0].type if ids else pa.string()
-        found = np.concatenate(codes) if self.layout.label else np.full(len(every), -1)
+        found = np.concatenate(codes) if label else np.full(len(every), -1)
         return Executions(pa.chunked_array(ids, type=kind), np.append(every, n_rows), found, list(names))
 
     def read(self, span: Span, columns: Sequence[str]) -> Iterator[ExecutionTable]:
-        """The executions of a span in their order, in several tables.
+        """The executions of a span in their order, in as few tables as memory allows, about equally large.
 
         Parameters
         ----------
@@ -142,10 +149,13 @@ class ParquetExecutions:
         names = [ID, *([layout.label] if layout.label else []), *clock, *columns, *layout.told]
         if span.counts is None:
             size = max(int(PIECE / max(self.samples_per_row, 1)), 1)
-            for _, batch in self._batches(span.start, span.stop, names, size):
-                yield table_of_lists(batch, layout, columns)
+            batches = self._batches(span.start, span.stop, names, size)
+            pieces: Iterator[ExecutionTable] = (table_of_lists(batch, layout, columns) for _, batch in batches)
         else:
-            yield from self._read_samples(span, span.counts, names, columns)
+            pieces = self._read_samples(span, span.counts, names, columns)
+        n_executions = span.stop - span.start if span.counts is None else len(span.counts)
+        n_samples = (span.stop - span.start) * (self.samples_per_row if span.counts is None else 1)
+        return _together(pieces, ceil(n_executions / ceil((n_samples * len(columns) + 1) / TABLE)))
 
     def _read_samples(
         self, span: Span, counts: IntArray, names: Sequence[str], columns: Sequence[str]
@@ -211,6 +221,18 @@ class ParquetExecutions:
             raise DataFileError(f"an undamaged Parquet file at {self.path!r}", reason, "Copy or write it again.") from error
 
 
+def _together(pieces: Iterable[ExecutionTable], size: int) -> Iterator[ExecutionTable]:
+    """Tables joined until they have so many executions."""
+    held: list[ExecutionTable] = []
+    for piece in pieces:
+        held.append(piece)
+        if sum(map(len, held)) >= size:
+            yield joined(held)
+            held.clear()
+    if held:
+        yield joined(held)
+
+
 def _begins(ids: Any, previous: object) -> IntArray:
     """Where in a batch another execution begins than that of the row before.
 
@@ -231,9 +253,3 @@ def _begins(ids: Any, previous: object) -> IntArray:
         changed |= missing[1:] != missing[:-1]
     begins = np.flatnonzero(changed) + 1
     return np.concatenate([[0], begins]) if previous is NONE_YET or ids[0].as_py() != previous else begins
-
-
-def _decoded(ids: Any) -> Any:
-    import pyarrow as pa
-
-    return ids.dictionary_decode() if pa.types.is_dictionary(ids.type) else ids

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from probdmp.checks import LARGEST_MAGNITUDE, SECONDS, BoolArray, FloatArray, IntArray
 from probdmp.demonstrations.demonstration import LONGEST_RECORDING, SHORTEST_RECORDING
-from probdmp.io.parquet_arrays import codes_of, list_lengths, numbers_of, seconds_of, steady, told_once
+from probdmp.io.parquet_arrays import codes_of, list_lengths, numbers_of, plain_names, recoded, seconds_of, steady, told_once
 from probdmp.io.parquet_clock import even_clocks
 from probdmp.io.parquet_layout import ID, STEP, TIME, ParquetLayout
 
-__all__ = ["ExecutionTable", "table_of_lists", "table_of_samples"]
+__all__ = ["ExecutionTable", "joined", "table_of_lists", "table_of_samples"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -21,7 +21,7 @@ class ExecutionTable:
     """N executions, one after the other."""
 
     ids: Any
-    """(N) Arrow array, as in the file."""
+    """(N) Arrow array."""
     codes: IntArray
     """(N,) array: which of `labels` each has; -1 for none."""
     labels: list[str]
@@ -51,6 +51,29 @@ class ExecutionTable:
         return np.asarray(self.problems == "", dtype=np.bool_)
 
 
+def joined(tables: Sequence[ExecutionTable]) -> ExecutionTable:
+    """Tables of one file as one, in their order."""
+    import pyarrow as pa
+
+    if len(tables) == 1:
+        return tables[0]
+    labels: dict[str, int] = {}
+    codes = [recoded(table.codes, table.labels, labels) for table in tables]
+    bases = np.cumsum([0, *(table.offsets[-1] for table in tables)])
+    offsets = [base + table.offsets[:-1] for base, table in zip(bases[:-1], tables, strict=True)]
+    return ExecutionTable(
+        pa.concat_arrays([table.ids for table in tables]),
+        np.concatenate(codes),
+        list(labels),
+        np.append(np.concatenate(offsets), bases[-1]),
+        np.concatenate([table.counts for table in tables]),
+        np.concatenate([table.steps for table in tables]),
+        {name: np.concatenate([table.columns[name] for table in tables]) for name in tables[0].columns},
+        {name: np.concatenate([table.told[name] for table in tables]) for name in tables[0].told},
+        np.concatenate([table.problems for table in tables]),
+    )
+
+
 def table_of_samples(rows: Any, layout: ParquetLayout, wanted: Sequence[str], counts: IntArray) -> ExecutionTable:
     """From rows that are samples.
 
@@ -67,7 +90,7 @@ def table_of_samples(rows: Any, layout: ParquetLayout, wanted: Sequence[str], co
     table = _timed(
         seconds_of(rows[TIME]),
         ExecutionTable(
-            ids=rows[ID].take(firsts) if len(rows) else rows[ID],
+            ids=plain_names(rows[ID].take(firsts) if len(rows) else rows[ID]),
             codes=codes[firsts],
             labels=labels,
             offsets=offsets,
@@ -93,7 +116,7 @@ def table_of_lists(rows: Any, layout: ParquetLayout, wanted: Sequence[str]) -> E
     columns = {name: _aligned(numbers_of(rows[name]), own, extents) for name, own in zip(names, lengths, strict=True)}
     codes, labels = codes_of(rows[layout.label]) if layout.label else (np.full(len(rows), -1), [])
     table = ExecutionTable(
-        ids=rows[ID],
+        ids=plain_names(rows[ID]),
         codes=codes,
         labels=labels,
         offsets=np.concatenate([[0], np.cumsum(extents)]),
