@@ -130,14 +130,15 @@ class PathWindows:
         self._dof = model.means.shape[1]
         self._of_pairs = model.covariance.swapaxes(1, 2).reshape(-1, self._dof, self._dof)
         self._noise = np.diag(np.tile(model.noise_variances, len(self.offsets)))
-        whitening = inverse_of_cholesky(self._covariances(pairs))
+        compared = whitening = inverse_of_cholesky(self._covariances(pairs))
         if combination is not None:
-            self._unmixed = np.kron(np.linalg.pinv(combination), np.eye(self._dof))
-            whitening = whitening @ np.kron(combination, np.eye(self._dof))
+            whitening = compared @ np.kron(combination, np.eye(self._dof))
         means = model.means[ticks].reshape(len(ticks), -1)
         gains = model.goal_gains[ticks].reshape(*means.shape, -1)
         signals = np.tile(np.arange(self._dof), len(self.offsets))
         self.maps = linear_maps(whitening, means, gains, signals, of_each)
+        self._whitening = self.maps.maps[..., -len(signals) :] if combination is None else compared
+        """(U, L D, L D) array: L^-1 of what is compared."""
 
     def _covariances(self, pairs: IntArray) -> FloatArray:
         """Of windows with points in these pairs (…, P, P), noise included: (…, L D, L D) array."""
@@ -192,7 +193,7 @@ class PathWindows:
         points, dof = residuals.shape[-2:]
         size = points * dof
         flat = residuals.reshape(*residuals.shape[:3], size)
-        whitening = self._whitening(rows)[..., :size, :size]
+        whitening = self._whitening[self.maps.which[rows]][..., :size, :size]
         # (T, S, n, size): matrix products are far faster than sums over indices
         white = np.moveaxis(np.matmul(whitening, np.moveaxis(np.nan_to_num(flat), 0, -1)), -1, 0)
         diagonal = np.broadcast_to(np.log(np.diagonal(whitening, axis1=-2, axis2=-1)), flat.shape).copy()
@@ -221,18 +222,11 @@ class PathWindows:
     def shares(self, places: IntArray, shift: int, deviations: FloatArray) -> FloatArray:
         """The contributions in n windows at places (n,), that are (n, P, D) from their means: (n, D) array."""
         compared = np.nan_to_num(self._compared(deviations))
-        rows, first = np.minimum(places, len(self._ticks) - 1), -len(self.maps.signals)
-        whitening = self.maps.maps[self.maps.which[rows, shift], :, first:]
-        if self._combination is not None:
-            whitening = np.matmul(whitening, self._unmixed)
+        rows = np.minimum(places, len(self._ticks) - 1)
+        whitening = self._whitening[self.maps.which[rows, shift]]
         flat = compared.reshape(len(rows), -1, 1)
         weighed = np.matmul(whitening.mT, np.matmul(whitening, flat)).reshape(compared.shape)
         return np.abs((compared * weighed).sum(axis=1)) * np.sign(compared[:, -1])
-
-    def _whitening(self, rows: IntArray) -> FloatArray:
-        """L^-1 of what is compared at places, (T, S, L D, L D)."""
-        maps = self.maps.maps[self.maps.which[rows]][..., -len(self.maps.signals) :]
-        return maps if self._combination is None else np.matmul(maps, self._unmixed)
 
     def _residuals(self, rows: IntArray, windows: FloatArray, means: FloatArray) -> FloatArray:
         """What is compared minus its mean at each shift, (n, T, S, L, D)."""
