@@ -26,12 +26,14 @@ from probdmp.dmp.responses import GOAL, LONGEST_KEPT, START_VELOCITY, parameter_
 from probdmp.dmp.task import Task
 from probdmp.dmp.transformation_system import POSITION
 from probdmp.gaussian import Belief, observe
+from probdmp.kept import Kept
 
 __all__ = [
     "JointExecutions",
     "JointModel",
     "joint_executions",
     "joint_model",
+    "mean_parameters",
     "mean_positions",
     "state_designs",
     "state_rows",
@@ -41,6 +43,8 @@ START = 0
 """Where p0 is in x; the parameters follow, each one place further than in theta."""
 TOLD_TOLERANCE = 1e-6
 """Standard deviation of a start velocity that was told, as a fraction of the range."""
+MOST_KEPT_BYTES = 2**26
+"""Of settings together, and of lessons together, that are kept for later executions."""
 
 
 class JointModel(NamedTuple):
@@ -85,6 +89,30 @@ class _Lessons(NamedTuple):
     goal: _Lesson | None
     covariance: FloatArray
     """Of z, in the end."""
+
+    @property
+    def n_bytes(self) -> int:
+        """About how much memory it takes."""
+        return self.factors.nbytes + self.covariance.nbytes
+
+
+class _Setting(NamedTuple):
+    """What executions that last equally long, at one rate, have in common."""
+
+    rows: FloatArray
+    """(T, N, 3, n_basis + 3) array, read-only: each state as a function of what is unknown."""
+    end_rows: FloatArray
+    """(N, n_basis + 3) array, read-only: the position at the end."""
+    system: DeviationSystem
+
+    @property
+    def n_bytes(self) -> int:
+        """About how much memory it takes."""
+        return self.rows.nbytes
+
+
+_SETTINGS: Kept[_Setting] = Kept(MOST_KEPT_BYTES)
+_LESSONS: Kept[_Lessons] = Kept(MOST_KEPT_BYTES)
 
 
 class JointExecutions(NamedTuple):
@@ -170,17 +198,17 @@ def joint_executions(primitive: Primitive, tasks: Task, dts: FloatArray, n_steps
     dts : (N) or (1) array, seconds.
     n_steps : T.
     """
-    compute = _kept_setting if len(dts) == 1 and n_steps <= LONGEST_KEPT else _setting
-    rows, end_rows, system = compute(primitive, tuple(tasks.duration[: len(dts)].tolist()), tuple(dts.tolist()), n_steps)
-    return JointExecutions(joint_model(primitive, tasks, end_rows), rows, system)
+    durations = tasks.duration[: len(dts)]
+    if len(dts) == 1 and n_steps <= LONGEST_KEPT:  # executions often differ in nothing but what they are told
+        key = (primitive.identity, float(durations[0]), float(dts[0]), n_steps)
+        setting = _SETTINGS.get(key, lambda: _setting(primitive, durations, dts, n_steps))
+    else:
+        setting = _setting(primitive, durations, dts, n_steps)
+    return JointExecutions(joint_model(primitive, tasks, setting.end_rows), setting.rows, setting.system)
 
 
-def _setting(
-    primitive: Primitive, lengths: tuple[float, ...], steps: tuple[float, ...], n_steps: int
-) -> tuple[FloatArray, FloatArray, DeviationSystem]:
-    """Rows (T, N, 3, N + 3) of executions, those of their ends (N, N + 3), and how they deviate."""
-    durations, dts, configuration = np.array(lengths), np.array(steps), primitive.configuration
-    phase_steps = dts / durations
+def _setting(primitive: Primitive, durations: FloatArray, dts: FloatArray, n_steps: int) -> _Setting:
+    phase_steps, configuration = dts / durations, primitive.configuration
     lasts = np.round(1 / phase_steps).astype(np.intp)
     length = max(n_steps, int(lasts.max()) + 1)
     responses = np.stack([parameter_responses(configuration, float(step), length) for step in phase_steps], axis=1)
@@ -191,18 +219,19 @@ def _setting(
         rows = rows[:n_steps].copy()
     for array in (rows, end_rows):
         array.setflags(write=False)
-    return rows, end_rows, system
+    return _Setting(rows, end_rows, system)
 
 
-_kept_setting = lru_cache(maxsize=16)(_setting)
-"""Executions often differ in nothing but what they are told."""
+def mean_parameters(model: JointModel) -> FloatArray:
+    """What is expected of x, (*batch, S, N + 3) array."""
+    *batch, n_signals, n, r = model.factors.shape
+    moved = _products(model.factors.reshape(*batch, n_signals * n, r), model.belief.mean)
+    return np.asarray(model.means + moved.reshape(*moved.shape[:-1], n_signals, n))
 
 
 def mean_positions(executions: JointExecutions) -> FloatArray:
     """Expected values of all signals, (T, N, S) array."""
-    model, positions = executions.model, executions.rows[:, :, POSITION]
-    means = model.means + np.matmul(model.factors, model.belief.mean[:, None, :, None])[..., 0]
-    return np.asarray(np.einsum("tkn,kdn->tkd", positions, means))
+    return np.asarray(np.einsum("tkn,kdn->tkd", executions.rows[:, :, POSITION], mean_parameters(executions.model)))
 
 
 @lru_cache(maxsize=32)
@@ -231,7 +260,8 @@ def _lessons_of(primitive: Primitive, end_rows: FloatArray, kinds: tuple[BoolArr
     """
     if any(math.prod(kind.shape[:-1]) != 1 for kind in (end_rows, *kinds)):
         return _lessons(primitive, end_rows, *kinds)
-    return _kept_lessons(primitive, end_rows.shape, end_rows.tobytes(), *(kind.tobytes() for kind in kinds))
+    key = (primitive.identity, end_rows.shape, end_rows.tobytes(), *(kind.tobytes() for kind in kinds))
+    return _LESSONS.get(key, lambda: _lessons(primitive, end_rows, *kinds))
 
 
 def _lessons(
@@ -258,17 +288,9 @@ def _lessons(
     of_velocity, covariance = lesson(row, velocity, (TOLD_TOLERANCE * signals.ranges) ** 2)
     of_move, _ = lesson(end_rows, moved, tolerances)
     of_goal, covariance = lesson(end_rows, goal, tolerances)
-    return _Lessons(factors, of_velocity, of_move, of_goal, covariance)
-
-
-@lru_cache(maxsize=8)
-def _kept_lessons(primitive: Primitive, shape: tuple[int, ...], end_rows: bytes, *kinds: bytes) -> _Lessons:
-    """The same from bytes, by which they are found again: executions often differ in nothing but their values."""
-    masks = (np.frombuffer(kind, dtype=np.bool_).reshape(*shape[:-1], -1) for kind in kinds)
-    lessons = _lessons(primitive, np.frombuffer(end_rows).reshape(shape), *masks)
-    for array in (lessons.factors, lessons.covariance):  # they are in the model of every execution of the kind
+    for array in (factors, covariance):  # they may be in the model of every execution of the kind
         array.setflags(write=False)
-    return lessons
+    return _Lessons(factors, of_velocity, of_move, of_goal, covariance)
 
 
 def _told(model: JointModel, lesson: _Lesson, deltas: FloatArray, column: int, handling: str) -> JointModel:
@@ -278,7 +300,7 @@ def _told(model: JointModel, lesson: _Lesson, deltas: FloatArray, column: int, h
     """
     deltas = np.nan_to_num(deltas)
     inside = conditioned_part(deltas, lesson.covariance, handling)
-    mean = model.belief.mean + np.matmul(lesson.gain, inside[..., None])[..., 0]
+    mean = model.belief.mean + _products(lesson.gain, inside)
     means = model.means.copy()
     means[..., column] += deltas - inside
     return JointModel(means, model.factors, Belief(mean, model.belief.covariance))
@@ -286,11 +308,14 @@ def _told(model: JointModel, lesson: _Lesson, deltas: FloatArray, column: int, h
 
 def _expected(model: JointModel, lesson: _Lesson) -> FloatArray:
     """Mean of the row of a lesson, (*batch, S)."""
-    return _along(model.means, lesson.row) + np.matmul(lesson.design, model.belief.mean[..., None])[..., 0]
+    return _products(model.means, lesson.row) + _products(lesson.design, model.belief.mean)
 
 
-def _along(means: FloatArray, row: FloatArray) -> FloatArray:
-    return np.asarray(np.sum(means * row[..., None, :], axis=-1))
+def _products(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
+    """Matrices (*batch, a, b) times vectors (*batch, b), (*batch, a) array: one product where one matrix is for all."""
+    if matrices.shape[:-2] == (1,):
+        return vectors @ matrices[0].T
+    return np.matmul(matrices, vectors[..., None])[..., 0]
 
 
 def _design(factors: FloatArray, rows: FloatArray) -> FloatArray:
