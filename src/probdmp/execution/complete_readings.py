@@ -11,8 +11,8 @@ and p(o) = p(o | u) p(u) / p(u | o) holds for any u, so for this one too:
 
     ln p(o) = ln N(o - D (m + F u'); 0, V) - |u'|^2 / 2 - ln |I + F^T A F| / 2
 
-No large numbers cancel, and an error of u' counts only squared. Executions that last equally long and are told the same kinds of
-things share all but o and m. V is that of each group of outputs alone, see `probdmp.execution.reading_noise`.
+No large numbers cancel, and an error of u' counts only squared. Executions that last equally long and are told the same kinds
+of things share all but o and m. V is that of each group of outputs alone, see `probdmp.execution.reading_noise`.
 """
 
 from collections.abc import Iterator
@@ -27,8 +27,8 @@ from probdmp.execution.sensor_array import SensorArray
 
 __all__ = ["CompleteReadings", "complete_readings"]
 
-BLOCK = 1024
-"""Executions that are looked at side by side."""
+BLOCK = 256
+"""Executions that are looked at side by side: what is computed of them stays in the cache of a processor."""
 
 
 class _Group(NamedTuple):
