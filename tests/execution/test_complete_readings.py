@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from strategies import make_joint_primitive, seeds
 
 from probdmp.dmp import stack_tasks, task_for
-from probdmp.dmp.joint_model import joint_executions, mean_parameters
+from probdmp.dmp.joint_model import joint_executions
 from probdmp.execution import SensorArray
 from probdmp.execution.complete_readings import complete_readings
 from probdmp.execution.reading_noise import reading_noise
@@ -65,5 +65,5 @@ def test_they_are_one_draw_from_a_gaussian(seed, rank, is_goal_told):
     tasks = stack_tasks([task_for(primitive, primitive.start + rng.standard_normal(2), goal) for goal in goals])
     executions, array = joint_executions(primitive, tasks, np.array([DT]), TICKS), SensorArray(primitive)
     readings = rng.standard_normal((5, TICKS, 3))
-    found = complete_readings(executions, array).log_likelihoods(readings, mean_parameters(executions.model))
+    found = complete_readings(executions, array).log_likelihoods(readings, executions.model.means)
     np.testing.assert_allclose(found, dense_scores(executions, array, readings), rtol=1e-8)

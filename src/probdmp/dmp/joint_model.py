@@ -33,7 +33,6 @@ __all__ = [
     "JointModel",
     "joint_executions",
     "joint_model",
-    "mean_parameters",
     "mean_positions",
     "state_designs",
     "state_rows",
@@ -66,16 +65,14 @@ class JointModel(NamedTuple):
 
 
 class _Lesson(NamedTuple):
-    """What is told of a row of x teaches as much of z, whatever is told."""
+    """What is told of a row of x teaches as much of the rest, whatever is told."""
 
     row: FloatArray
     """(*batch, N + 3) array."""
-    design: FloatArray
-    """The row as a function of z, (*batch, S, r) array."""
     covariance: FloatArray
     """Of what was expected, with a unit in place of what is not told; (*batch, S, S) array."""
     gain: FloatArray
-    """(*batch, r, S) array."""
+    """How it moves x, (*batch, S (N + 3), S) array."""
 
 
 class _Lessons(NamedTuple):
@@ -127,7 +124,7 @@ class JointExecutions(NamedTuple):
 
 
 def joint_model(primitive: Primitive, task: Task, end_rows: FloatArray) -> JointModel:
-    """What is known about an execution before it begins.
+    """What is known about an execution before it begins; what is told moves the means of x, and the mean of z is 0.
 
     Parameters
     ----------
@@ -141,7 +138,8 @@ def joint_model(primitive: Primitive, task: Task, end_rows: FloatArray) -> Joint
     # A goal that was not told stays where it was learned: from another start, the movement to it is another.
     moves = np.where(np.isnan(task.goal), primitive.start - primitive.starts(task), np.nan)
     moves, goals = (np.concatenate([values, untold], axis=-1) for values in (moves, task.goal))
-    moved = ~np.isnan(moves) & np.any(np.nan_to_num(moves) != 0)
+    stays = ~np.isnan(moves)
+    moved = stays & np.any(stays & (moves != 0))
     kinds: tuple[BoolArray, ...] = (np.isnan(task.start), ~np.isnan(velocities), moved, ~np.isnan(goals))
     if end_rows.shape[:-1] == (1,):  # what is told, and when it ends, is the same for all
         kinds = (kinds[0][:1], *(kind[:1] if np.all(kind == kind[:1]) else kind for kind in kinds[1:]))
@@ -149,14 +147,13 @@ def joint_model(primitive: Primitive, task: Task, end_rows: FloatArray) -> Joint
     mean = _start_and_parameters(primitive)[0]
     means = np.array(np.broadcast_to(mean, (*batch, *mean.shape)))
     means[..., : primitive.n_dof, START] = primitive.starts(task)
-    model = JointModel(means, factors, Belief(np.zeros((*covariance.shape[:-2], factors.shape[-1])), covariance))
     if of_velocity is not None:
-        model = _told(model, of_velocity, velocities - _expected(model, of_velocity), START_VELOCITY + 1, handling)
+        means = _told(means, of_velocity, velocities - _products(means, of_velocity.row), START_VELOCITY + 1, handling)
     if of_move is not None:
-        model = _told(model, of_move, moves, GOAL + 1, handling)
+        means = _told(means, of_move, moves, GOAL + 1, handling)
     if of_goal is not None:
-        model = _told(model, of_goal, goals - _expected(model, of_goal), GOAL + 1, handling)
-    return model
+        means = _told(means, of_goal, goals - _products(means, of_goal.row), GOAL + 1, handling)
+    return JointModel(means, factors, Belief(np.zeros((*covariance.shape[:-2], factors.shape[-1])), covariance))
 
 
 def state_rows(responses: FloatArray, duration: FloatArray) -> FloatArray:
@@ -222,16 +219,9 @@ def _setting(primitive: Primitive, durations: FloatArray, dts: FloatArray, n_ste
     return _Setting(rows, end_rows, system)
 
 
-def mean_parameters(model: JointModel) -> FloatArray:
-    """What is expected of x, (*batch, S, N + 3) array."""
-    *batch, n_signals, n, r = model.factors.shape
-    moved = _products(model.factors.reshape(*batch, n_signals * n, r), model.belief.mean)
-    return np.asarray(model.means + moved.reshape(*moved.shape[:-1], n_signals, n))
-
-
 def mean_positions(executions: JointExecutions) -> FloatArray:
     """Expected values of all signals, (T, N, S) array."""
-    return np.asarray(np.einsum("tkn,kdn->tkd", executions.rows[:, :, POSITION], mean_parameters(executions.model)))
+    return np.asarray(np.einsum("tkn,kdn->tkd", executions.rows[:, :, POSITION], executions.model.means))
 
 
 @lru_cache(maxsize=32)
@@ -282,7 +272,8 @@ def _lessons(
         seen = observe(before, np.where(told, 0.0, np.nan), design, np.diag(tolerances))
         both = told[..., :, None] & told[..., None, :]
         expected = np.where(both, seen.innovation_covariance, np.eye(len(tolerances)))
-        return _Lesson(row, design, expected, seen.gain @ seen.whitening), seen.belief.covariance
+        moving = factors.reshape(*factors.shape[:-3], -1, factors.shape[-1]) @ seen.gain @ seen.whitening
+        return _Lesson(row, expected, moving), seen.belief.covariance
 
     row = np.eye(learned.shape[-2])[START_VELOCITY + 1]
     of_velocity, covariance = lesson(row, velocity, (TOLD_TOLERANCE * signals.ranges) ** 2)
@@ -293,22 +284,16 @@ def _lessons(
     return _Lessons(factors, of_velocity, of_move, of_goal, covariance)
 
 
-def _told(model: JointModel, lesson: _Lesson, deltas: FloatArray, column: int, handling: str) -> JointModel:
-    """The mean if a row is told to be `deltas` (*batch, S) from where it is expected, NaN where it is not told.
+def _told(means: FloatArray, lesson: _Lesson, deltas: FloatArray, column: int, handling: str) -> FloatArray:
+    """Means of x if a row is told to be `deltas` (*batch, S) from where it is expected, NaN where it is not told.
 
     As far as the model has them it is conditioned on them; the rest moves a column of x.
     """
-    deltas = np.nan_to_num(deltas)
+    deltas = np.where(np.isnan(deltas), 0.0, deltas)
     inside = conditioned_part(deltas, lesson.covariance, handling)
-    mean = model.belief.mean + _products(lesson.gain, inside)
-    means = model.means.copy()
-    means[..., column] += deltas - inside
-    return JointModel(means, model.factors, Belief(mean, model.belief.covariance))
-
-
-def _expected(model: JointModel, lesson: _Lesson) -> FloatArray:
-    """Mean of the row of a lesson, (*batch, S)."""
-    return _products(model.means, lesson.row) + _products(lesson.design, model.belief.mean)
+    moved = means + _products(lesson.gain, inside).reshape(means.shape)
+    moved[..., column] += deltas - inside
+    return moved
 
 
 def _products(matrices: FloatArray, vectors: FloatArray) -> FloatArray:

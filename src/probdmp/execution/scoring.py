@@ -11,7 +11,7 @@ import numpy as np
 from probdmp.checks import FloatArray, IntArray
 from probdmp.demonstrations import Demonstration
 from probdmp.dmp import Primitive, Task, linear_gaussian_model, stack_tasks, take_tasks, unstack_tasks
-from probdmp.dmp.joint_model import joint_executions, mean_parameters
+from probdmp.dmp.joint_model import joint_executions
 from probdmp.errors import InputError
 from probdmp.execution.complete_readings import CompleteReadings, complete_readings
 from probdmp.execution.execution_batch import ExecutionBatch
@@ -75,7 +75,7 @@ def score_batch(primitive: Primitive, batch: ExecutionBatch, sensors: SensorArra
 
 def _alike(batch: ExecutionBatch) -> Iterator[IntArray]:
     """Which complete executions last equally long and are told the same kinds of things."""
-    complete = np.flatnonzero(np.isfinite(batch.observations.sum(axis=(1, 2))))
+    complete = np.flatnonzero(np.isfinite(np.einsum("nto->n", batch.observations)))
     task = batch.tasks
     told = [np.isnan(part) for part in (task.start, task.goal, task.start_velocity) if part is not None]
     keys = np.column_stack([task.duration, *told])[complete]
@@ -100,16 +100,19 @@ def _score_for(
 
 
 def _score_joint(primitive: Primitive, batch: ExecutionBatch, array: SensorArray) -> FloatArray:
-    first, (n_executions, n_ticks, n_outputs) = take_tasks(batch.tasks, [0]), batch.observations.shape
+    n_executions, n_ticks, n_outputs = batch.observations.shape
     executions = joint_executions(primitive, batch.tasks, np.array([batch.dt]), n_ticks)
     together = array.matrix.shape[1]
     if (array.is_coupled or together > 1) and n_ticks * together > LARGEST_GAUSSIAN:
-        plan = planned_states(executions).reshape(n_ticks, n_executions, -1) @ array.dense_matrix.T
-        schedule = gain_schedule(primitive, first, batch.dt, array, np.ones((n_ticks, n_outputs), dtype=np.bool_))
-        return schedule.log_likelihoods(batch.observations - plan.swapaxes(0, 1))
-    key = (*kind_of(primitive, first, batch.dt, array), n_ticks)
+        plan, seen = (
+            planned_states(executions).reshape(n_ticks, n_executions, -1),
+            np.ones((n_ticks, n_outputs), dtype=np.bool_),
+        )
+        schedule = gain_schedule(primitive, take_tasks(batch.tasks, [0]), batch.dt, array, seen)
+        return schedule.log_likelihoods(batch.observations - (plan @ array.dense_matrix.T).swapaxes(0, 1))
+    key = (*kind_of(primitive, batch.tasks, batch.dt, array), n_ticks)
     complete = _KEPT.get(key, lambda: complete_readings(executions, array))
-    return complete.log_likelihoods(batch.observations, mean_parameters(executions.model))
+    return complete.log_likelihoods(batch.observations, executions.model.means)
 
 
 def _score_independent(primitive: Primitive, batch: ExecutionBatch, array: SensorArray) -> FloatArray:
