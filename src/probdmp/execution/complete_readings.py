@@ -42,6 +42,8 @@ class _Group(NamedTuple):
     """D, (M, T, H) array."""
     weights: FloatArray
     """W, (M, T, H) array."""
+    information: FloatArray
+    """A, (H, H) array."""
     noise: ReadingNoise
 
 
@@ -50,7 +52,7 @@ class CompleteReadings(NamedTuple):
 
     groups: tuple[_Group, ...]
     gains: FloatArray
-    """Of (W^T o, m) in u', (2 P, r) array."""
+    """Of W^T o - A m in u', (P, r) array."""
     factor: FloatArray
     """F^T, (r, P) array."""
     constant: float
@@ -72,11 +74,13 @@ class CompleteReadings(NamedTuple):
 
     def _of(self, readings: FloatArray, expected: FloatArray) -> FloatArray:
         """The same of readings (O, N, T) and parameters (N, P)."""
-        known = np.concatenate([np.zeros_like(expected), expected], axis=1)
+        told = np.zeros_like(expected)
         for group in self.groups:
+            own = told[:, group.parameters]
+            np.matmul(expected[:, group.parameters], -group.information, out=own)
             for output, weights in zip(group.outputs, group.weights, strict=True):
-                known[:, group.parameters] += readings[output] @ weights
-        unknown = known @ self.gains
+                own += readings[output] @ weights
+        unknown = told @ self.gains
         fitted = expected + unknown @ self.factor
         scores = self.constant - 0.5 * np.einsum("nr,nr->n", unknown, unknown)
         for group in self.groups:
@@ -96,11 +100,10 @@ def complete_readings(executions: JointExecutions, array: SensorArray) -> Comple
     factor = blocks @ (directions * np.sqrt(np.maximum(variances, 0.0)))
     information = np.zeros((len(factor),) * 2)
     for group in groups:
-        information[group.parameters, group.parameters] += np.einsum("mth,mti->hi", group.designs, group.weights, optimize=True)
+        information[group.parameters, group.parameters] = group.information
     precision = np.eye(len(variances)) + factor.T @ information @ factor
-    gains = np.linalg.solve(precision, factor.T)
-    constant = -0.5 * np.linalg.slogdet(precision)[1]
-    return CompleteReadings(groups, np.concatenate([gains.T, -information @ gains.T]), factor.T.copy(), float(constant))
+    gains, constant = np.linalg.solve(precision, factor.T), -0.5 * np.linalg.slogdet(precision)[1]
+    return CompleteReadings(groups, gains.T.copy(), factor.T.copy(), float(constant))
 
 
 def _groups(executions: JointExecutions, array: SensorArray) -> Iterator[_Group]:
@@ -118,4 +121,6 @@ def _groups(executions: JointExecutions, array: SensorArray) -> Iterator[_Group]
         noise = reading_noise(
             system, system.variances[0, signals], sensors, array.covariance[np.ix_(outputs, outputs)], n_ticks
         )
-        yield _Group(outputs, slice(signals.start * n, signals.stop * n), designs, noise.weighted(designs), noise)
+        weights = noise.weighted(designs)
+        information = np.einsum("mth,mti->hi", designs, weights, optimize=True)
+        yield _Group(outputs, slice(signals.start * n, signals.stop * n), designs, weights, information, noise)
