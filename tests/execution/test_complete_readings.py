@@ -27,11 +27,12 @@ def test_outputs_one_by_one_and_all_at_once_are_the_same(seed, n_ticks, log_nois
         reading_noise(system, variances[i : i + 1], sensors[i][None, None], noise[i : i + 1, i : i + 1], n_ticks)
         for i in range(2)
     ]
-    designs, residuals = rng.standard_normal((2, n_ticks, 5)), rng.standard_normal((2, 4, n_ticks))
-    weighted = np.concatenate([own.weighted(designs[i : i + 1]) for i, own in enumerate(each)])
-    np.testing.assert_allclose(weighted, both.weighted(designs), rtol=1e-7, atol=1e-9 * np.abs(weighted).max())
-    scores = np.sum([own.log_likelihoods(residuals[i : i + 1]) for i, own in enumerate(each)], axis=0)
-    np.testing.assert_allclose(scores, both.log_likelihoods(residuals), rtol=1e-8)
+    designs, residuals = rng.standard_normal((2, n_ticks, 5)), rng.standard_normal((4, 2, n_ticks))
+    weighted = np.concatenate([own.weighted(designs[i]) for i, own in enumerate(each)])
+    expected = both.weighted(designs.reshape(2 * n_ticks, 5))
+    np.testing.assert_allclose(weighted, expected, rtol=1e-7, atol=1e-9 * np.abs(weighted).max())
+    scores = np.sum([own.log_likelihoods(np.ascontiguousarray(residuals[:, i])) for i, own in enumerate(each)], axis=0)
+    np.testing.assert_allclose(scores, both.log_likelihoods(residuals.reshape(4, -1)), rtol=1e-8)
 
 
 def dense_scores(executions, array, readings):

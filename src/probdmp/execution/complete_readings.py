@@ -32,18 +32,16 @@ BLOCK = 256
 
 
 class _Group(NamedTuple):
-    """M outputs that look at the same K signals, of H = K (N + 3) parameters."""
+    """M outputs that look at the same signals, of H parameters."""
 
     outputs: IntArray
     """(M,) array."""
     parameters: slice
     """Which of those of all signals."""
     designs: FloatArray
-    """D, (M, T, H) array."""
+    """D^T, (H, M T) array."""
     weights: FloatArray
-    """W, (M, T, H) array."""
-    information: FloatArray
-    """A, (H, H) array."""
+    """W of the readings of one output after the other, and below it -A of what is expected; (M T + H, H) array."""
     noise: ReadingNoise
 
 
@@ -68,27 +66,32 @@ class CompleteReadings(NamedTuple):
         scores = np.empty(len(readings))
         for first in range(0, len(readings), BLOCK):
             part = slice(first, first + BLOCK)
-            by_output = np.ascontiguousarray(np.moveaxis(readings[part], -1, 0))
-            scores[part] = self._of(by_output, expected[part].reshape(by_output.shape[1], -1))
+            scores[part] = self._of(readings[part], expected[part].reshape(-1, len(self.gains)))
         return scores
 
     def _of(self, readings: FloatArray, expected: FloatArray) -> FloatArray:
-        """The same of readings (O, N, T) and parameters (N, P)."""
-        told = np.zeros_like(expected)
-        for group in self.groups:
-            own = told[:, group.parameters]
-            np.matmul(expected[:, group.parameters], -group.information, out=own)
-            for output, weights in zip(group.outputs, group.weights, strict=True):
-                own += readings[output] @ weights
+        """The same with parameters (N, P)."""
+        told, known = np.zeros_like(expected), [_side_by_side(group, readings, expected) for group in self.groups]
+        for group, both in zip(self.groups, known, strict=True):
+            told[:, group.parameters] = both @ group.weights
         unknown = told @ self.gains
         fitted = expected + unknown @ self.factor
         scores = self.constant - 0.5 * np.einsum("nr,nr->n", unknown, unknown)
-        for group in self.groups:
-            residuals = np.matmul(fitted[:, group.parameters], group.designs.mT)
-            for output, residual in zip(group.outputs, residuals, strict=True):
-                np.subtract(readings[output], residual, out=residual)
+        for group, both in zip(self.groups, known, strict=True):
+            residuals = fitted[:, group.parameters] @ group.designs
+            np.subtract(both[:, : residuals.shape[1]], residuals, out=residuals)
             scores += group.noise.log_likelihoods(residuals)
         return np.asarray(scores)
+
+
+def _side_by_side(group: _Group, readings: FloatArray, expected: FloatArray) -> FloatArray:
+    """What is read of the outputs of a group, one after the other, and what is expected of its parameters: (N, M T + H)."""
+    (count, n_ticks, _), own = readings.shape, expected[:, group.parameters]
+    both = np.empty((count, len(group.weights)))
+    for i, output in enumerate(group.outputs):
+        both[:, i * n_ticks : (i + 1) * n_ticks] = readings[..., output]
+    both[:, -own.shape[1] :] = own
+    return both
 
 
 def complete_readings(executions: JointExecutions, array: SensorArray) -> CompleteReadings:
@@ -100,7 +103,7 @@ def complete_readings(executions: JointExecutions, array: SensorArray) -> Comple
     factor = blocks @ (directions * np.sqrt(np.maximum(variances, 0.0)))
     information = np.zeros((len(factor),) * 2)
     for group in groups:
-        information[group.parameters, group.parameters] = group.information
+        information[group.parameters, group.parameters] = -group.weights[-len(group.designs) :]
     precision = np.eye(len(variances)) + factor.T @ information @ factor
     gains, constant = np.linalg.solve(precision, factor.T), -0.5 * np.linalg.slogdet(precision)[1]
     return CompleteReadings(groups, gains.T.copy(), factor.T.copy(), float(constant))
@@ -117,10 +120,10 @@ def _groups(executions: JointExecutions, array: SensorArray) -> Iterator[_Group]
         if not len(outputs):
             continue
         sensors = array.dense_matrix[outputs].reshape(len(outputs), n_signals, 3)[:, signals]
-        designs = np.einsum("mkc,tcn->mtkn", sensors, rows).reshape(len(outputs), n_ticks, -1)
+        designs = np.einsum("mkc,tcn->mtkn", sensors, rows).reshape(len(outputs) * n_ticks, -1)
         noise = reading_noise(
             system, system.variances[0, signals], sensors, array.covariance[np.ix_(outputs, outputs)], n_ticks
         )
         weights = noise.weighted(designs)
-        information = np.einsum("mth,mti->hi", designs, weights, optimize=True)
-        yield _Group(outputs, slice(signals.start * n, signals.stop * n), designs, weights, information, noise)
+        stacked = np.concatenate([weights, -designs.T @ weights])
+        yield _Group(outputs, slice(signals.start * n, signals.stop * n), designs.T.copy(), stacked, noise)

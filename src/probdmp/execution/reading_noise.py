@@ -32,18 +32,18 @@ class SeriesNoise(NamedTuple):
         return self.gains.closed_loop.nbytes + self.gains.predicted_covariances.nbytes + self.gains.covariances.nbytes
 
     def weighted(self, designs: FloatArray) -> FloatArray:
-        """V^-1 times designs (1, T, H): R^-1 times what is left of them when the deviation that explains them best is gone."""
-        systems, columns = self.gains.systems, np.ascontiguousarray(designs[0].T)
+        """V^-1 times designs (T, H): R^-1 times what is left of them when the deviation that explains them best is gone."""
+        systems, columns = self.gains.systems, np.ascontiguousarray(designs.T)
         deviations = smooth_series(self.gains, columns[..., None]).means[:, :, 0]
         return (designs - (deviations @ systems.sensor[0]).T) / systems.noise
 
     def log_likelihoods(self, residuals: FloatArray) -> FloatArray:
-        """Of e of each execution, (1, N, T); (N,) array, nats."""
-        return score_series(self.gains, residuals[0][..., None])
+        """Of e of each execution, (N, T); (N,) array, nats."""
+        return score_series(self.gains, residuals[..., None])
 
 
 class DenseNoise(NamedTuple):
-    """Of M outputs, in T ticks."""
+    """Of M outputs, one after the other, in T ticks each."""
 
     whitening: FloatArray
     """L^-1, (M T, M T) array."""
@@ -56,17 +56,15 @@ class DenseNoise(NamedTuple):
         return self.whitening.nbytes
 
     def weighted(self, designs: FloatArray) -> FloatArray:
-        """V^-1 times designs (M, T, H)."""
-        white = self.whitening @ designs.reshape(len(self.whitening), -1)
-        return (self.whitening.T @ white).reshape(designs.shape)
+        """V^-1 times designs (M T, H)."""
+        return self.whitening.T @ (self.whitening @ designs)
 
     def log_likelihoods(self, residuals: FloatArray) -> FloatArray:
-        """Of e of each execution, (M, N, T); (N,) array, nats."""
-        flat = residuals.swapaxes(0, 1).reshape(residuals.shape[1], -1)
-        squares = np.zeros(len(flat))
+        """Of e of each execution, (N, M T); (N,) array, nats."""
+        squares = np.zeros(len(residuals))
         for begin in range(0, len(self.whitening), PANEL):
             end = begin + PANEL
-            white = flat[:, :end] @ self.whitening[begin:end, :end].T
+            white = residuals[:, :end] @ self.whitening[begin:end, :end].T
             squares += np.einsum("nk,nk->n", white, white)
         return self.constant - 0.5 * squares
 
