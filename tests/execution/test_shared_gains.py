@@ -1,5 +1,7 @@
 """Executions that share their gains: the same as each of them by itself, whatever is told, measured and missed."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -184,6 +186,16 @@ def test_schedules_are_kept():
         gain_schedule(make_joint_primitive(np.random.default_rng(1)), task, DT, array, seen),
     ):
         assert other is not schedule
+
+
+def test_threads_score_at_the_same_time():
+    rng = np.random.default_rng(3)
+    primitives = [make_joint_primitive(rng) for _ in range(3)]
+    work = [(p, random_batch(rng, p, SensorArray(p), 12, 0.0)) for p in primitives] * 8
+    with ThreadPoolExecutor(2) as pool:
+        found = list(pool.map(lambda one: score_batch(*one), work))
+    for scores, one in zip(found, work, strict=True):
+        np.testing.assert_array_equal(scores, score_batch(*one))
 
 
 def test_no_executions_have_no_scores():
