@@ -16,6 +16,7 @@ LAYERS = (
         "errors",
         "checks",
         "parameters",
+        "kept",
         "gaussian",
         "demonstrations",
         "dmp",

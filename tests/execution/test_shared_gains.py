@@ -1,5 +1,7 @@
 """Executions that share their gains: the same as each of them by itself, whatever is told, measured and missed."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,6 +13,7 @@ from probdmp.dmp.joint_model import joint_executions
 from probdmp.errors import InputError
 from probdmp.execution import (
     ExecutionBatch,
+    LinearSensor,
     SensorArray,
     filter_recordings,
     recording_of_readings,
@@ -74,17 +77,45 @@ def test_scores_through_sensors_of_any_linear_kind(seed, coupling, channels):
     np.testing.assert_allclose(score_batch(primitive, batch, array), expected, rtol=1e-8, atol=1e-8 * np.abs(expected).max())
 
 
-@given(seeds)
-@settings(max_examples=5)
-def test_one_product_or_one_recursion_is_the_same(seed):
+@given(seeds, st.sampled_from([False, True, "noise"]))
+@settings(max_examples=8)
+def test_one_product_or_one_recursion_is_the_same(seed, coupling):
     rng = np.random.default_rng(seed)
     primitive = make_joint_primitive(rng)
-    array = SensorArray(primitive)
+    array = SensorArray(primitive, random_sensors(rng, primitive, DT, 2, coupling=coupling))
     batch = random_batch(rng, primitive, array, 16, 0.0)
     by_product = score_batch(primitive, batch, array)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("probdmp.execution.scoring.LARGEST_GAUSSIAN", 0)
         np.testing.assert_allclose(score_batch(primitive, batch, array), by_product, rtol=1e-9, atol=1e-9)
+
+
+@given(seeds, st.sampled_from(["predictive", "posterior"]), st.sampled_from([(), ("force",)]))
+@settings(max_examples=8)
+def test_positions_by_themselves_or_one_recursion_for_all_is_the_same(seed, forcing_noise, channels):
+    rng = np.random.default_rng(seed)
+    primitive = make_joint_primitive(rng, channels=channels, forcing_noise=forcing_noise)
+    array, task = SensorArray(primitive), task_for(primitive, goal=primitive.goal)
+    tasks = stack_tasks([task] * 5)
+    recordings = sample_recordings(primitive, task, DT, 5, rng, array)
+    batch = ExecutionBatch(np.stack([readings_of(array, recording) for recording in recordings]), tasks, DT)
+    n_ticks = batch.observations.shape[1]
+    plan = planned_states(joint_executions(primitive, tasks, np.array([DT]), n_ticks)).reshape(n_ticks, 5, -1)
+    schedule = gain_schedule(primitive, stack_tasks([task]), DT, array, np.ones((n_ticks, len(array.outputs)), dtype=np.bool_))
+    expected = schedule.log_likelihoods(batch.observations - (plan @ array.dense_matrix.T).swapaxes(0, 1))
+    np.testing.assert_allclose(score_batch(primitive, batch, array), expected, rtol=1e-9, atol=1e-9)
+
+
+def test_outputs_that_say_nothing_change_nothing():
+    rng = np.random.default_rng(5)
+    primitive = make_joint_primitive(rng)
+    position = np.kron(np.eye(2), [0.0, 0.0, 1.0])
+    precise, silent = np.diag([1e-4, 1e-4]), np.diag([1e-4, np.inf])
+    alone = SensorArray(primitive, [LinearSensor("one", position[:1], precise[:1, :1])])
+    both = SensorArray(primitive, [LinearSensor("two", position, silent)])
+    batch = random_batch(rng, primitive, SensorArray(primitive, [LinearSensor("two", position, precise)]), 8, 0.0)
+    of_one = ExecutionBatch(np.ascontiguousarray(batch.observations[..., :1]), batch.tasks, DT)
+    np.testing.assert_allclose(score_batch(primitive, batch, both), score_batch(primitive, of_one, alone), rtol=1e-12)
 
 
 @settings(max_examples=15)
@@ -155,6 +186,16 @@ def test_schedules_are_kept():
         gain_schedule(make_joint_primitive(np.random.default_rng(1)), task, DT, array, seen),
     ):
         assert other is not schedule
+
+
+def test_threads_score_at_the_same_time():
+    rng = np.random.default_rng(3)
+    primitives = [make_joint_primitive(rng) for _ in range(3)]
+    work = [(p, random_batch(rng, p, SensorArray(p), 12, 0.0)) for p in primitives] * 8
+    with ThreadPoolExecutor(2) as pool:
+        found = list(pool.map(lambda one: score_batch(*one), work))
+    for scores, one in zip(found, work, strict=True):
+        np.testing.assert_array_equal(scores, score_batch(*one))
 
 
 def test_no_executions_have_no_scores():

@@ -39,6 +39,6 @@ def conditioned_part(delta: FloatArray, covariance: FloatArray, handling: str) -
         return delta
     if handling == "attractor":
         return np.zeros_like(delta)
-    squared = np.sum(delta * np.linalg.solve(covariance, delta[..., None])[..., 0], axis=-1, keepdims=True)
+    squared = np.einsum("...i,...ij,...j->...", delta, np.linalg.inv(covariance), delta)[..., None]
     count = np.maximum(np.sum(delta != 0, axis=-1, keepdims=True), 1)
-    return np.asarray(delta / (1 + (squared / count / REACH**2) ** 2) ** 0.25)
+    return np.asarray(delta / np.sqrt(np.sqrt(1 + (squared / count / REACH**2) ** 2)))

@@ -26,6 +26,7 @@ from probdmp.dmp.responses import GOAL, LONGEST_KEPT, START_VELOCITY, parameter_
 from probdmp.dmp.task import Task
 from probdmp.dmp.transformation_system import POSITION
 from probdmp.gaussian import Belief, observe
+from probdmp.kept import Kept
 
 __all__ = [
     "JointExecutions",
@@ -41,6 +42,8 @@ START = 0
 """Where p0 is in x; the parameters follow, each one place further than in theta."""
 TOLD_TOLERANCE = 1e-6
 """Standard deviation of a start velocity that was told, as a fraction of the range."""
+MOST_KEPT_BYTES = 2**26
+"""Of settings together, and of lessons together, that are kept for later executions."""
 
 
 class JointModel(NamedTuple):
@@ -62,16 +65,14 @@ class JointModel(NamedTuple):
 
 
 class _Lesson(NamedTuple):
-    """What is told of a row of x teaches as much of z, whatever is told."""
+    """What is told of a row of x teaches as much of the rest, whatever is told."""
 
     row: FloatArray
     """(*batch, N + 3) array."""
-    design: FloatArray
-    """The row as a function of z, (*batch, S, r) array."""
     covariance: FloatArray
     """Of what was expected, with a unit in place of what is not told; (*batch, S, S) array."""
     gain: FloatArray
-    """(*batch, r, S) array."""
+    """How it moves x, (*batch, S (N + 3), S) array."""
 
 
 class _Lessons(NamedTuple):
@@ -86,6 +87,30 @@ class _Lessons(NamedTuple):
     covariance: FloatArray
     """Of z, in the end."""
 
+    @property
+    def n_bytes(self) -> int:
+        """About how much memory it takes."""
+        return self.factors.nbytes + self.covariance.nbytes
+
+
+class _Setting(NamedTuple):
+    """What executions that last equally long, at one rate, have in common."""
+
+    rows: FloatArray
+    """(T, N, 3, n_basis + 3) array, read-only: each state as a function of what is unknown."""
+    end_rows: FloatArray
+    """(N, n_basis + 3) array, read-only: the position at the end."""
+    system: DeviationSystem
+
+    @property
+    def n_bytes(self) -> int:
+        """About how much memory it takes."""
+        return self.rows.nbytes
+
+
+_SETTINGS: Kept[_Setting] = Kept(MOST_KEPT_BYTES)
+_LESSONS: Kept[_Lessons] = Kept(MOST_KEPT_BYTES)
+
 
 class JointExecutions(NamedTuple):
     """A batch of N executions, ready to be observed."""
@@ -99,7 +124,7 @@ class JointExecutions(NamedTuple):
 
 
 def joint_model(primitive: Primitive, task: Task, end_rows: FloatArray) -> JointModel:
-    """What is known about an execution before it begins.
+    """What is known about an execution before it begins; what is told moves the means of x, and the mean of z is 0.
 
     Parameters
     ----------
@@ -113,7 +138,8 @@ def joint_model(primitive: Primitive, task: Task, end_rows: FloatArray) -> Joint
     # A goal that was not told stays where it was learned: from another start, the movement to it is another.
     moves = np.where(np.isnan(task.goal), primitive.start - primitive.starts(task), np.nan)
     moves, goals = (np.concatenate([values, untold], axis=-1) for values in (moves, task.goal))
-    moved = ~np.isnan(moves) & np.any(np.nan_to_num(moves) != 0)
+    stays = ~np.isnan(moves)
+    moved = stays & np.any(stays & (moves != 0))
     kinds: tuple[BoolArray, ...] = (np.isnan(task.start), ~np.isnan(velocities), moved, ~np.isnan(goals))
     if end_rows.shape[:-1] == (1,):  # what is told, and when it ends, is the same for all
         kinds = (kinds[0][:1], *(kind[:1] if np.all(kind == kind[:1]) else kind for kind in kinds[1:]))
@@ -121,14 +147,13 @@ def joint_model(primitive: Primitive, task: Task, end_rows: FloatArray) -> Joint
     mean = _start_and_parameters(primitive)[0]
     means = np.array(np.broadcast_to(mean, (*batch, *mean.shape)))
     means[..., : primitive.n_dof, START] = primitive.starts(task)
-    model = JointModel(means, factors, Belief(np.zeros((*covariance.shape[:-2], factors.shape[-1])), covariance))
     if of_velocity is not None:
-        model = _told(model, of_velocity, velocities - _expected(model, of_velocity), START_VELOCITY + 1, handling)
+        means = _told(means, of_velocity, velocities - _products(means, of_velocity.row), START_VELOCITY + 1, handling)
     if of_move is not None:
-        model = _told(model, of_move, moves, GOAL + 1, handling)
+        means = _told(means, of_move, moves, GOAL + 1, handling)
     if of_goal is not None:
-        model = _told(model, of_goal, goals - _expected(model, of_goal), GOAL + 1, handling)
-    return model
+        means = _told(means, of_goal, goals - _products(means, of_goal.row), GOAL + 1, handling)
+    return JointModel(means, factors, Belief(np.zeros((*covariance.shape[:-2], factors.shape[-1])), covariance))
 
 
 def state_rows(responses: FloatArray, duration: FloatArray) -> FloatArray:
@@ -170,17 +195,17 @@ def joint_executions(primitive: Primitive, tasks: Task, dts: FloatArray, n_steps
     dts : (N) or (1) array, seconds.
     n_steps : T.
     """
-    compute = _kept_setting if len(dts) == 1 and n_steps <= LONGEST_KEPT else _setting
-    rows, end_rows, system = compute(primitive, tuple(tasks.duration[: len(dts)].tolist()), tuple(dts.tolist()), n_steps)
-    return JointExecutions(joint_model(primitive, tasks, end_rows), rows, system)
+    durations = tasks.duration[: len(dts)]
+    if len(dts) == 1 and n_steps <= LONGEST_KEPT:  # executions often differ in nothing but what they are told
+        key = (primitive.identity, float(durations[0]), float(dts[0]), n_steps)
+        setting = _SETTINGS.get(key, lambda: _setting(primitive, durations, dts, n_steps))
+    else:
+        setting = _setting(primitive, durations, dts, n_steps)
+    return JointExecutions(joint_model(primitive, tasks, setting.end_rows), setting.rows, setting.system)
 
 
-def _setting(
-    primitive: Primitive, lengths: tuple[float, ...], steps: tuple[float, ...], n_steps: int
-) -> tuple[FloatArray, FloatArray, DeviationSystem]:
-    """Rows (T, N, 3, N + 3) of executions, those of their ends (N, N + 3), and how they deviate."""
-    durations, dts, configuration = np.array(lengths), np.array(steps), primitive.configuration
-    phase_steps = dts / durations
+def _setting(primitive: Primitive, durations: FloatArray, dts: FloatArray, n_steps: int) -> _Setting:
+    phase_steps, configuration = dts / durations, primitive.configuration
     lasts = np.round(1 / phase_steps).astype(np.intp)
     length = max(n_steps, int(lasts.max()) + 1)
     responses = np.stack([parameter_responses(configuration, float(step), length) for step in phase_steps], axis=1)
@@ -191,18 +216,12 @@ def _setting(
         rows = rows[:n_steps].copy()
     for array in (rows, end_rows):
         array.setflags(write=False)
-    return rows, end_rows, system
-
-
-_kept_setting = lru_cache(maxsize=16)(_setting)
-"""Executions often differ in nothing but what they are told."""
+    return _Setting(rows, end_rows, system)
 
 
 def mean_positions(executions: JointExecutions) -> FloatArray:
     """Expected values of all signals, (T, N, S) array."""
-    model, positions = executions.model, executions.rows[:, :, POSITION]
-    means = model.means + np.matmul(model.factors, model.belief.mean[:, None, :, None])[..., 0]
-    return np.asarray(np.einsum("tkn,kdn->tkd", positions, means))
+    return np.asarray(np.einsum("tkn,kdn->tkd", executions.rows[:, :, POSITION], executions.model.means))
 
 
 @lru_cache(maxsize=32)
@@ -231,7 +250,8 @@ def _lessons_of(primitive: Primitive, end_rows: FloatArray, kinds: tuple[BoolArr
     """
     if any(math.prod(kind.shape[:-1]) != 1 for kind in (end_rows, *kinds)):
         return _lessons(primitive, end_rows, *kinds)
-    return _kept_lessons(primitive, end_rows.shape, end_rows.tobytes(), *(kind.tobytes() for kind in kinds))
+    key = (primitive.identity, end_rows.shape, end_rows.tobytes(), *(kind.tobytes() for kind in kinds))
+    return _LESSONS.get(key, lambda: _lessons(primitive, end_rows, *kinds))
 
 
 def _lessons(
@@ -252,45 +272,35 @@ def _lessons(
         seen = observe(before, np.where(told, 0.0, np.nan), design, np.diag(tolerances))
         both = told[..., :, None] & told[..., None, :]
         expected = np.where(both, seen.innovation_covariance, np.eye(len(tolerances)))
-        return _Lesson(row, design, expected, seen.gain @ seen.whitening), seen.belief.covariance
+        moving = factors.reshape(*factors.shape[:-3], -1, factors.shape[-1]) @ seen.gain @ seen.whitening
+        return _Lesson(row, expected, moving), seen.belief.covariance
 
     row = np.eye(learned.shape[-2])[START_VELOCITY + 1]
     of_velocity, covariance = lesson(row, velocity, (TOLD_TOLERANCE * signals.ranges) ** 2)
     of_move, _ = lesson(end_rows, moved, tolerances)
     of_goal, covariance = lesson(end_rows, goal, tolerances)
+    for array in (factors, covariance):  # they may be in the model of every execution of the kind
+        array.setflags(write=False)
     return _Lessons(factors, of_velocity, of_move, of_goal, covariance)
 
 
-@lru_cache(maxsize=8)
-def _kept_lessons(primitive: Primitive, shape: tuple[int, ...], end_rows: bytes, *kinds: bytes) -> _Lessons:
-    """The same from bytes, by which they are found again: executions often differ in nothing but their values."""
-    masks = (np.frombuffer(kind, dtype=np.bool_).reshape(*shape[:-1], -1) for kind in kinds)
-    lessons = _lessons(primitive, np.frombuffer(end_rows).reshape(shape), *masks)
-    for array in (lessons.factors, lessons.covariance):  # they are in the model of every execution of the kind
-        array.setflags(write=False)
-    return lessons
-
-
-def _told(model: JointModel, lesson: _Lesson, deltas: FloatArray, column: int, handling: str) -> JointModel:
-    """The mean if a row is told to be `deltas` (*batch, S) from where it is expected, NaN where it is not told.
+def _told(means: FloatArray, lesson: _Lesson, deltas: FloatArray, column: int, handling: str) -> FloatArray:
+    """Means of x if a row is told to be `deltas` (*batch, S) from where it is expected, NaN where it is not told.
 
     As far as the model has them it is conditioned on them; the rest moves a column of x.
     """
-    deltas = np.nan_to_num(deltas)
+    deltas = np.where(np.isnan(deltas), 0.0, deltas)
     inside = conditioned_part(deltas, lesson.covariance, handling)
-    mean = model.belief.mean + np.matmul(lesson.gain, inside[..., None])[..., 0]
-    means = model.means.copy()
-    means[..., column] += deltas - inside
-    return JointModel(means, model.factors, Belief(mean, model.belief.covariance))
+    moved = means + _products(lesson.gain, inside).reshape(means.shape)
+    moved[..., column] += deltas - inside
+    return moved
 
 
-def _expected(model: JointModel, lesson: _Lesson) -> FloatArray:
-    """Mean of the row of a lesson, (*batch, S)."""
-    return _along(model.means, lesson.row) + np.matmul(lesson.design, model.belief.mean[..., None])[..., 0]
-
-
-def _along(means: FloatArray, row: FloatArray) -> FloatArray:
-    return np.asarray(np.sum(means * row[..., None, :], axis=-1))
+def _products(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
+    """Matrices (*batch, a, b) times vectors (*batch, b), (*batch, a) array: one product where one matrix is for all."""
+    if matrices.shape[:-2] == (1,):
+        return vectors @ matrices[0].T
+    return np.matmul(matrices, vectors[..., None])[..., 0]
 
 
 def _design(factors: FloatArray, rows: FloatArray) -> FloatArray:

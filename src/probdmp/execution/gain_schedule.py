@@ -18,11 +18,11 @@ from probdmp.checks import BoolArray, FloatArray
 from probdmp.dmp import Primitive, Task
 from probdmp.dmp.joint_model import joint_executions
 from probdmp.execution.joint_steps import JointSystem
-from probdmp.execution.kept import Kept
 from probdmp.execution.plans import kind_of_task
 from probdmp.execution.sensor_array import SensorArray
 from probdmp.gaussian import AffineObservation, AugmentedTick, augmented_tick, block_diagonal, no_observations
 from probdmp.gaussian.density import log_density_shares
+from probdmp.kept import Kept
 
 __all__ = ["GainSchedule", "gain_schedule", "kind_of"]
 

@@ -10,9 +10,9 @@ from probdmp.checks import FloatArray, freeze_arrays
 from probdmp.dmp import Primitive, Task
 from probdmp.dmp.joint_model import JointExecutions
 from probdmp.execution.joint_filtering import joint_covariances
-from probdmp.execution.kept import Kept
 from probdmp.execution.plans import kind_of_task, planned_states
 from probdmp.gaussian import GaussianSequence
+from probdmp.kept import Kept
 
 __all__ = ["roll_out_joint"]
 

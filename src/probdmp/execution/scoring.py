@@ -10,28 +10,28 @@ import numpy as np
 
 from probdmp.checks import FloatArray, IntArray
 from probdmp.demonstrations import Demonstration
-from probdmp.dmp import Primitive, Task, linear_gaussian_model, stack_tasks, unstack_tasks
+from probdmp.dmp import Primitive, Task, linear_gaussian_model, stack_tasks, take_tasks, unstack_tasks
 from probdmp.dmp.joint_model import joint_executions
 from probdmp.errors import InputError
 from probdmp.execution.complete_readings import CompleteReadings, complete_readings
 from probdmp.execution.execution_batch import ExecutionBatch
 from probdmp.execution.gain_schedule import gain_schedule, kind_of
 from probdmp.execution.independent_filtering import sensed_system
-from probdmp.execution.kept import Kept
-from probdmp.execution.plans import planned_outputs
+from probdmp.execution.plans import planned_states
 from probdmp.execution.readings import stack_readings
 from probdmp.execution.recordings import BATCH_SIZE, check_recordings, check_tasks, filter_recordings
 from probdmp.execution.sensor_array import SensorArray
 from probdmp.gaussian import score_series, shared_gains, shifted_paths
+from probdmp.kept import Kept
 
 __all__ = ["score_batch", "score_recordings"]
 
 FEW = 4
 """Executions for which it does not pay to compute gains once for all."""
 LARGEST_GAUSSIAN = 1024
-"""Readings of an execution up to which all of them together are one draw from a Gaussian."""
+"""Readings of outputs that look at the same signals up to which all of them together are one draw from a Gaussian."""
 MOST_KEPT_BYTES = 2**27
-"""Of such Gaussians that are kept for later executions."""
+"""Of what is kept of complete readings for later executions."""
 _KEPT: Kept[CompleteReadings] = Kept(MOST_KEPT_BYTES)
 
 
@@ -75,7 +75,7 @@ def score_batch(primitive: Primitive, batch: ExecutionBatch, sensors: SensorArra
 
 def _alike(batch: ExecutionBatch) -> Iterator[IntArray]:
     """Which complete executions last equally long and are told the same kinds of things."""
-    complete = np.flatnonzero(np.isfinite(batch.observations.sum(axis=(1, 2))))
+    complete = np.flatnonzero(np.isfinite(np.einsum("nto->n", batch.observations)))
     task = batch.tasks
     told = [np.isnan(part) for part in (task.start, task.goal, task.start_velocity) if part is not None]
     keys = np.column_stack([task.duration, *told])[complete]
@@ -100,14 +100,19 @@ def _score_for(
 
 
 def _score_joint(primitive: Primitive, batch: ExecutionBatch, array: SensorArray) -> FloatArray:
-    first, (_, n_ticks, n_outputs) = batch.take([0]).tasks, batch.observations.shape
+    n_executions, n_ticks, n_outputs = batch.observations.shape
     executions = joint_executions(primitive, batch.tasks, np.array([batch.dt]), n_ticks)
-    readings = batch.observations - planned_outputs(executions, array.dense_matrix)
-    if n_ticks * n_outputs > LARGEST_GAUSSIAN:
-        seen = np.ones((n_ticks, n_outputs), dtype=np.bool_)
-        return gain_schedule(primitive, first, batch.dt, array, seen).log_likelihoods(readings)
-    key = (*kind_of(primitive, first, batch.dt, array), n_ticks)
-    return _KEPT.get(key, lambda: complete_readings(executions, array)).log_likelihoods(readings)
+    together = array.matrix.shape[1]
+    if (array.is_coupled or together > 1) and n_ticks * together > LARGEST_GAUSSIAN:
+        plan, seen = (
+            planned_states(executions).reshape(n_ticks, n_executions, -1),
+            np.ones((n_ticks, n_outputs), dtype=np.bool_),
+        )
+        schedule = gain_schedule(primitive, take_tasks(batch.tasks, [0]), batch.dt, array, seen)
+        return schedule.log_likelihoods(batch.observations - (plan @ array.dense_matrix.T).swapaxes(0, 1))
+    key = (*kind_of(primitive, batch.tasks, batch.dt, array), n_ticks)
+    complete = _KEPT.get(key, lambda: complete_readings(executions, array))
+    return complete.log_likelihoods(batch.observations, executions.model.means)
 
 
 def _score_independent(primitive: Primitive, batch: ExecutionBatch, array: SensorArray) -> FloatArray:
