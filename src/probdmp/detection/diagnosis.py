@@ -74,7 +74,7 @@ def diagnose(
     n_rest = np.minimum(REST_TICKS[0] + seen_since, REST_TICKS[1])
     held = _are_held(means, recent, ticks, REST_EXTENT + 1.5 * noise_stds, n_rest)
     found = [Diagnosis("timing", "held")] * len(ticks)
-    back = LOOKED_AT[LOOKED_AT < recent.shape[1]]
+    back = LOOKED_AT[recent.shape[1] > LOOKED_AT]
     points = recent[:, -1 - back]
     points[np.isnan(points).any(axis=2)] = np.nan
     longest = np.max(np.where(np.isnan(points[..., 0]), 0, back), axis=1, initial=0)
@@ -173,7 +173,7 @@ def _explanations(longest: int) -> _Explanations:
     aside = [(o, 1.0, 0, rise, 0) for o in onsets for rise in RISES]
     pushes = [(o, 1.0, 0, np.inf, width) for o in onsets for width in WIDTHS]
     onset, speed, length, rise, width = np.array(nothing + paces + pauses + aside + pushes).T[..., None]
-    back = LOOKED_AT[LOOKED_AT <= longest]
+    back = LOOKED_AT[longest >= LOOKED_AT]
     since = np.maximum(onset - back, 0)
     bumps = np.where(since < width, np.sin(np.pi * since / np.maximum(width, 1)) ** 2, 0.0)
     lost = (1 - speed) * np.minimum(since, length)

@@ -87,8 +87,14 @@ def _about_channel(expectation: Expectation, further: int) -> Diagnosis:
     return Diagnosis("channel", f"unexpected {names[further]}")
 
 
-def better_fits(expectation: Expectation, paths: Sequence[FloatArray], durations: Sequence[float]) -> list[str]:
-    """Labels of the primitives of the library that fit paths from the start, n (T, D) arrays, better; empty if there is none."""
+def better_fits(expectation: Expectation, paths: Sequence[FloatArray], durations: FloatArray) -> list[str]:
+    """Labels of the primitives of the library that fit paths better, if there are.
+
+    Parameters
+    ----------
+    paths : n (T, D) arrays from the start, as fractions of the range.
+    durations : (n,) array, seconds.
+    """
     times = [np.arange(len(path)) * duration / TICKS for path, duration in zip(paths, durations, strict=True)]
     ranges = expectation.primitive.ranges
     return expectation.others.better(expectation.primitive, times, [path * ranges for path in paths])

@@ -86,7 +86,7 @@ class TrajectorySource:
 
     def better(self) -> str:
         """Label of the primitive of the library that fits better, if there is one."""
-        return better_fits(self._expectation, [np.stack(self._history)], [float(self._task.duration)])[0]
+        return better_fits(self._expectation, [np.stack(self._history)], np.array([self._task.duration]))[0]
 
     @property
     def sensors(self) -> SensorWatch:

@@ -240,8 +240,8 @@ def whiten(
 ) -> bool:
     """Points measured on Gaussian paths as white noise, L^-1 r, of E accounts for each of K paths.
 
-    By an account, points are at phases of the path and pushed aside by g b, b ~ N(0, I), besides noise: the covariance of points
-    p, q is L L^T = C[phase_p, phase_q] + g_p g_q I, and diag(variances) more where p = q.
+    By an account, points are at phases of the path, and pushed aside by g b, b ~ N(0, I), besides noise: the covariance of two
+    of them, p and q, in L L^T is C[phase_p, phase_q] + g_p g_q I, and diag(variances) more where p = q.
 
     Parameters
     ----------
