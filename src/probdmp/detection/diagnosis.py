@@ -134,18 +134,19 @@ def _are_held(
     extents : (D,) array, root mean square by which what is at rest still seems to move.
     n_rest : (n,) array: ticks that count.
     """
-    n_ticks, executions = recent.shape[1], np.arange(len(recent))
-    is_latest = np.arange(n_ticks) >= n_ticks - n_rest[:, None]
-    counted = is_latest & ~np.isnan(recent).any(axis=2)
-    latest, counts = np.where(counted[..., None], recent, 0.0), np.maximum(counted.sum(axis=1), 1)[:, None]
-    places = latest.sum(axis=1) / counts
-    away = recent - places[:, None]
-    spread = np.sqrt(np.sum(np.where(counted[..., None], away, 0.0) ** 2, axis=1) / counts)
-    at_rest = (counted.sum(axis=1) >= REST_TICKS[0]) & np.all(spread <= extents, axis=1)
-    moved = np.any(np.abs(away) > 3 * extents, axis=2)[:, ::-1]
-    since = np.where(moved.any(axis=1), np.argmax(moved, axis=1), np.minimum(ticks + 1, n_ticks))
-    due = means[executions, np.minimum(ticks, TICKS)] - means[executions, np.clip(ticks - since, 0, TICKS)]
-    return np.asarray(at_rest & np.any(np.abs(due) > np.maximum(5 * extents, LEAST_DUE), axis=1))
+    latest = recent[:, -max(REST_TICKS) :]
+    is_latest = np.arange(-latest.shape[1], 0) >= -n_rest[:, None]
+    counted = is_latest & ~np.isnan(latest).any(axis=2)
+    counts = np.maximum(counted.sum(axis=1), 1)[:, None]
+    places = np.where(counted[..., None], latest, 0.0).sum(axis=1) / counts
+    away = np.where(counted[..., None], latest - places[:, None], 0.0)
+    held = (counted.sum(axis=1) >= REST_TICKS[0]) & np.all(np.sqrt(np.sum(away**2, axis=1) / counts) <= extents, axis=1)
+    some, n_ticks = np.flatnonzero(held), recent.shape[1]
+    moved = np.any(np.abs(recent[some] - places[some, None]) > 3 * extents, axis=2)[:, ::-1]
+    since = np.where(moved.any(axis=1), np.argmax(moved, axis=1), np.minimum(ticks[some] + 1, n_ticks))
+    due = means[some, np.minimum(ticks[some], TICKS)] - means[some, np.clip(ticks[some] - since, 0, TICKS)]
+    held[some] = np.any(np.abs(due) > np.maximum(5 * extents, LEAST_DUE), axis=1)
+    return held
 
 
 class _Explanations(NamedTuple):
