@@ -69,8 +69,9 @@ def whitened_points(
     """The same of points on K paths, by E accounts of each; arrays as of `probdmp.detection.point_densities`."""
     white, logarithms = np.empty((2, *residuals.shape))
     n_numbers = covariances.shape[1] * covariances.shape[2]
-    flat = np.ascontiguousarray(covariances).reshape(-1, n_numbers, n_numbers)
-    if not kernels.whiten(flat, noise_variances, phases, aside, np.ascontiguousarray(residuals), white, logarithms):
+    flat = covariances.reshape(-1, n_numbers, n_numbers)
+    given = (np.ascontiguousarray(array) for array in (flat, noise_variances, phases, aside, residuals))
+    if not kernels.whiten(*given, white, logarithms):
         raise np.linalg.LinAlgError("Matrix is not positive definite")
     return white, logarithms
 
