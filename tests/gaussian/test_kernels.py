@@ -520,38 +520,128 @@ def test_rest_that_does_not_belong_to_windows_is_refused(fault):
         weigh()
 
 
+def both_modules():
+    return {_kernels_numpy, _compiled() if kernels.COMPILED else _kernels_numpy}
+
+
 @given(st.integers(1, 40), st.integers(0, 19), seeds, st.sampled_from([1.0, 1e-9, 1e9]))
 def test_residuals_of_small_gaussians_are_whitened_as_by_their_cholesky_factors(size, count, seed, scale):
+    """Each of them a path of one point."""
     rng = np.random.default_rng(seed)
     factors = np.tril(rng.normal(size=(count, size, size)), -1) * 0.3 / np.sqrt(size) + np.eye(size)
     factors *= scale * np.exp(rng.normal(size=(count, size, 1)))
-    white, residuals = rng.normal(size=(2, count, size))
-    residuals = np.matmul(factors, white[..., None])[..., 0]
-    covariances = np.matmul(factors, factors.mT)
-    for module in {_kernels_numpy, _compiled() if kernels.COMPILED else _kernels_numpy}:
-        found, diagonals = np.full((2, count, size), -7.0)
+    white = rng.normal(size=(count, 1, 1, size))
+    residuals = np.matmul(factors[:, None, None], white[..., None])[..., 0]
+    nowhere, certain = np.zeros((count, 1, 1), dtype=np.int64), np.zeros((count, size))
+    for module in both_modules():
+        found, logarithms = np.full((2, count, 1, 1, size), -7.0)
         leave_nan_behind()
-        assert module.whiten(covariances, residuals, found, diagonals)
+        assert module.whiten(
+            np.matmul(factors, factors.mT), certain, nowhere, np.zeros((count, 1, 1)), residuals, found, logarithms
+        )
         np.testing.assert_allclose(found, white, rtol=0, atol=1e-12 * (1 + np.abs(white).max(initial=0)))
-        np.testing.assert_allclose(diagonals, np.diagonal(factors, axis1=1, axis2=2), rtol=1e-12)
+        diagonals = np.diagonal(factors, axis1=1, axis2=2)
+        np.testing.assert_allclose(np.exp(logarithms[:, 0, 0]), diagonals, rtol=1e-12)
 
 
-@pytest.mark.parametrize("entry", [0.0, -1.0, np.nan])
+@st.composite
+def points_on_paths(draw):
+    """Covariances, variances, phases, how far aside and residuals of P points of D numbers, by E accounts of K paths."""
+    k, e, p, d, m = (draw(st.integers(low, high)) for low, high in ((0, 3), (0, 9), (0, 9), (1, 4), (1, 8)))
+    rng, missing = np.random.default_rng(draw(seeds)), draw(st.sampled_from([0.0, 0.2, 1.0]))
+    factors = rng.normal(size=(k, m * d, m * d)) / np.sqrt(m * d)
+    residuals = rng.normal(size=(k, e, p, d))
+    residuals[rng.random(residuals.shape) < missing] = np.nan
+    aside = rng.normal(size=(k, e, p)) * draw(st.sampled_from([0.0, 1.0]))
+    return np.matmul(factors, factors.mT), 0.1 + rng.random((k, d)), rng.integers(0, m, (k, e, p)), aside, residuals
+
+
+@given(points_on_paths())
+def test_points_of_paths_are_whitened_as_by_the_covariance_of_what_was_seen(case):
+    """Points at one phase are measured each by itself; what pushes them aside does so in each direction by itself."""
+    covariances, variances, phases, aside, residuals = case
+    n_paths, n_accounts, n_points, dof = residuals.shape
+    for module in both_modules():
+        white, logarithms = np.full((2, *residuals.shape), -7.0)
+        leave_nan_behind()
+        assert module.whiten(*case, white, logarithms)
+        for k, e in np.ndindex(n_paths, n_accounts):
+            numbers = (phases[k, e, :, None] * dof + np.arange(dof)).ravel()
+            covariance = covariances[k][np.ix_(numbers, numbers)] + np.diag(np.tile(variances[k], n_points))
+            covariance += np.kron(np.outer(aside[k, e], aside[k, e]), np.eye(dof))
+            seen = ~np.isnan(residuals[k, e].ravel())
+            factor, own, heights = (
+                np.linalg.cholesky(covariance[np.ix_(seen, seen)]),
+                white[k, e].ravel(),
+                logarithms[k, e].ravel(),
+            )
+            np.testing.assert_allclose(factor @ own[seen], residuals[k, e].ravel()[seen], rtol=0, atol=1e-11)
+            np.testing.assert_allclose(heights[seen], np.log(np.diagonal(factor)), rtol=0, atol=1e-12)
+            assert not own[~seen].any()
+            assert not heights[~seen].any()
+
+
+@given(points_on_paths())
+def test_points_of_paths_are_whitened_alike_by_both(case):
+    found = []
+    for module in both_modules():
+        white, logarithms = np.empty((2, *case[-1].shape))
+        module.whiten(*case, white, logarithms)
+        found.append((white, logarithms))
+    np.testing.assert_allclose(found[0], found[-1], rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("entry", [0.0, -1.0, np.nan, np.inf])
 @pytest.mark.parametrize("which", range(10))
 def test_of_what_is_not_positive_definite_is_said_so(which, entry):
+    """Unless that was not seen."""
     covariances = np.tile(np.eye(3), (10, 1, 1))
     covariances[which, 1, 1] = entry
-    for module in {_kernels_numpy, _compiled() if kernels.COMPILED else _kernels_numpy}:
-        assert not module.whiten(covariances, np.ones((10, 3)), np.empty((10, 3)), np.empty((10, 3)))
+    nowhere, aside, certain = np.zeros((10, 1, 1), dtype=np.int64), np.zeros((10, 1, 1)), np.zeros((10, 3))
+    residuals = np.ones((10, 1, 1, 3))
+    for module in both_modules():
+        white, logarithms = np.empty((2, *residuals.shape))
+        assert not module.whiten(covariances, certain, nowhere, aside, residuals, white, logarithms)
+        unseen = residuals.copy()
+        unseen[which, ..., 1] = np.nan
+        assert module.whiten(covariances, certain, nowhere, aside, unseen, white, logarithms)
 
 
 @needs_extension
-@pytest.mark.parametrize("fault", range(4))
-def test_matrices_and_residuals_of_different_sizes_are_refused(fault):
-    shapes = [(2, 3, 3), (2, 3), (2, 3), (2, 3)]
-    shapes[fault] = (*shapes[fault][:-1], 4)
-    with pytest.raises(ValueError, match="expected"):
-        _compiled().whiten(*(np.ones(shape) for shape in shapes))
+@pytest.mark.parametrize("fault", range(7))
+@pytest.mark.parametrize("axis", range(4))
+def test_points_that_do_not_belong_to_paths_are_refused(fault, axis):
+    """Two paths of six numbers, three accounts of each, four points of two numbers."""
+    shapes = [(2, 6, 6), (2, 2), (2, 3, 4), (2, 3, 4), *[(2, 3, 4, 2)] * 3]
+    if axis < len(shapes[fault]):
+        shapes[fault] = (*shapes[fault][:axis], 5, *shapes[fault][axis + 1 :])
+        arrays = [np.ones(shape, dtype=np.int64 if k == 2 else np.float64) for k, shape in enumerate(shapes)]
+        with pytest.raises(ValueError, match="expected"):
+            _compiled().whiten(*arrays)
+
+
+@needs_extension
+@pytest.mark.parametrize("phase", [-1, 3, 2**62, -(2**62)])
+def test_points_beyond_a_path_are_refused(phase):
+    phases, numbers = np.zeros((1, 1, 4), dtype=np.int64), np.ones((3, 1, 1, 4, 2))
+    phases[0, 0, 2] = phase
+    with pytest.raises(ValueError, match="phases: expected points of paths of 6 numbers"):
+        _compiled().whiten(np.ones((1, 6, 6)), np.ones((1, 2)), phases, np.ones((1, 1, 4)), *numbers)
+
+
+@needs_extension
+@pytest.mark.parametrize("shape", [(0, 0, 0, 0), (2**40, 1, 0, 0), (0, 2**40, 1, 2), (1, 2**40, 0, 2)])
+def test_of_nothing_nothing_is_whitened(shape):
+    k, e, p, d = shape
+    paths = np.empty((k, 3 * d, 3 * d)), np.empty((k, d)), np.zeros((k, e, p), dtype=np.int64), np.empty((k, e, p))
+    assert _compiled().whiten(*paths, *np.empty((3, *shape)))
+
+
+@needs_extension
+def test_covariances_larger_than_memory_are_refused():
+    paths = np.empty((0, 0, 0)), np.empty((0, 2**40)), np.empty((0, 1, 1), dtype=np.int64), np.empty((0, 1, 1))
+    with pytest.raises(ValueError, match="residuals: expected few numbers"):
+        _compiled().whiten(*paths, *np.empty((3, 0, 1, 1, 2**40)))
 
 
 @needs_extension

@@ -91,7 +91,7 @@ class ChannelStatistic:
         seen = ~np.isnan(residuals[:, :, 0])
         n, t = np.nonzero(~seen.all(axis=-1))
         if len(n):
-            white[n, t] = self._white_of_seen(rows[t], residuals[n, t])
+            white[n, t] = whitened(self._covariances[rows[t]], residuals[n, t])[0]
         squares = white**2
         penalties = (SHIFTS / SHIFT_STD) ** 2
         of_movement = squares[..., : self._n_movement].sum(axis=-1) + penalties
@@ -120,10 +120,3 @@ class ChannelStatistic:
         expected = means[:, self._ticks[rows]]  # (n, T, shifts, P, S)
         deviations = windows[:, :, None] - expected
         return np.asarray(deviations.reshape(*deviations.shape[:3], -1)[..., self._chosen])
-
-    def _white_of_seen(self, rows: IntArray, residuals: FloatArray) -> FloatArray:
-        """Windows (W, shifts, entries) whitened by what was seen of them alone; zero elsewhere."""
-        seen = ~np.isnan(residuals)
-        together = seen[..., None] & seen[..., None, :]
-        covariances = np.where(together, self._covariances[rows], np.eye(residuals.shape[-1]))
-        return whitened(covariances, np.where(seen, residuals, 0.0))[0]

@@ -1,17 +1,15 @@
 """Which primitive of a library fits an execution better than the one it should be."""
 
 from collections.abc import Mapping, Sequence
-from math import lgamma, log, pi
 from typing import NamedTuple
 
 import numpy as np
 
 from probdmp.checks import FloatArray
-from probdmp.detection.evidence import DEGREES_OF_FREEDOM
 from probdmp.detection.path_model import path_model
 from probdmp.detection.phase_clock import TICKS
+from probdmp.detection.point_densities import densities_of_points
 from probdmp.detection.profile import ExecutionProfile
-from probdmp.detection.windows import whitened
 from probdmp.dmp import Primitive
 
 __all__ = ["Candidates", "Comparison"]
@@ -30,7 +28,7 @@ class Candidates(NamedTuple):
     means: FloatArray
     """(R, M, D) array, fractions of the range."""
     covariances: FloatArray
-    """(R, M D, M D) array."""
+    """(R, M, D, M, D) array."""
     noise_variances: FloatArray
     """(R, D) array."""
     ranges: FloatArray
@@ -42,29 +40,27 @@ class Candidates(NamedTuple):
     def of(cls, primitives: Sequence[Primitive], profiles: Mapping[str, ExecutionProfile]) -> "Candidates":
         """Of primitives with profiles by their identity."""
         models = [path_model(p, profiles[p.identity], knows_goal=False).of_movement() for p in primitives]
-        size = models[0].means.size
         return cls(
             np.stack([model.means for model in models]),
-            np.stack([model.covariance.reshape(size, size) for model in models]),
+            np.stack([model.covariance for model in models]),
             np.stack([model.noise_variances for model in models]),
             np.stack([p.ranges for p in primitives]),
             np.array([p.duration for p in primitives]),
         )
 
     def log_densities(self, times: FloatArray, displacements: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Of displacements (n, D) in data units at times (n,), seconds, of a multivariate t; and mean squares. (R,) arrays."""
-        (n, d), r = displacements.shape, np.arange(len(self.durations))[:, None]
-        phases = np.clip(np.rint(TICKS * times / self.durations[:, None]).astype(int), 0, TICKS)
-        residuals = (displacements / self.ranges[:, None] - self.means[r, phases]).reshape(len(r), n * d)
-        rows = (phases[..., None] * d + np.arange(d)).reshape(len(r), n * d)
-        places = (r[..., None] * self.covariances.shape[1] + rows[:, :, None]) * self.covariances.shape[1] + rows[:, None, :]
-        covariances = self.covariances.ravel().take(places)
-        covariances[:, np.arange(n * d), np.arange(n * d)] += np.tile(self.noise_variances, n)
-        white, logarithms = whitened(covariances, residuals)
-        squares, nu, size = (white**2).sum(axis=1), DEGREES_OF_FREEDOM, n * d
-        scales = logarithms.sum(axis=1) + n * np.log(self.ranges).sum(axis=1)
-        shape = lgamma((nu + size) / 2) - lgamma(nu / 2) - size / 2 * log(nu * pi)
-        return shape - scales - (nu + size) / 2 * np.log1p(squares / nu), squares / size
+        """Of n executions at P points, but for a constant; and mean squares. (R, n) arrays.
+
+        Parameters
+        ----------
+        times, displacements : (n, P) and (n, P, D) arrays, seconds and data units.
+        """
+        paths = np.arange(len(self.durations))[:, None, None]
+        phases = np.clip(np.rint(TICKS * times / self.durations[paths]).astype(np.int64), 0, TICKS)
+        residuals = displacements / self.ranges[:, None, None] - self.means[paths, phases]
+        aside = np.zeros(phases.shape)
+        densities, squares = densities_of_points(self.covariances, self.noise_variances, phases, aside, residuals)
+        return densities - times.shape[1] * np.log(self.ranges).sum(axis=1)[:, None], squares.mean(axis=(2, 3))
 
 
 class Comparison:
@@ -81,24 +77,31 @@ class Comparison:
         self._primitives, self._profiles = primitives, profiles
         self._candidates: dict[tuple[str, ...], Candidates] = {}
 
-    def better(self, own: Primitive, times: FloatArray, displacements: FloatArray) -> str:
-        """Label of the likeliest primitive if it is clearly likelier than the own one, else nothing.
+    def better(self, own: Primitive, times: Sequence[FloatArray], displacements: Sequence[FloatArray]) -> list[str]:
+        """Of n executions the label of the likeliest primitive if it is clearly likelier than the own one, else nothing.
 
         Parameters
         ----------
-        times : (T,) array, seconds.
-        displacements : (T, D) array, data units; rows with NaN are left out.
+        times : n (T,) arrays, seconds.
+        displacements : n (T, D) arrays, data units; rows with NaN are left out.
         """
-        seen = np.flatnonzero(~np.isnan(displacements).any(axis=1))[::-COMPARED_EVERY][::-1]
+        found = [""] * len(times)
         rivals = [label for label, p in self._primitives.items() if p.names == own.names]
-        if len(seen) < 2 or len(rivals) < 2:
-            return ""
+        if len(rivals) < 2:
+            return found
         if own.names not in self._candidates:
             self._candidates[own.names] = Candidates.of([self._primitives[label] for label in rivals], self._profiles)
-        densities, mean_squares = self._candidates[own.names].log_densities(times[seen], displacements[seen])
-        best = int(np.argmax(densities))
-        clearly = densities[best] > densities[rivals.index(self._label(own))] + MARGIN
-        return rivals[best] if clearly and mean_squares[best] < PLAUSIBLE else ""
+        seen = [np.flatnonzero(~np.isnan(moved).any(axis=1))[::-COMPARED_EVERY][::-1] for moved in displacements]
+        for n_points in {len(rows) for rows in seen} - {0, 1}:
+            some = [k for k, rows in enumerate(seen) if len(rows) == n_points]
+            densities, mean_squares = self._candidates[own.names].log_densities(
+                np.stack([times[k][seen[k]] for k in some]), np.stack([displacements[k][seen[k]] for k in some])
+            )
+            best, alike = np.argmax(densities, axis=0), np.arange(len(some))
+            clearly = densities[best, alike] > densities[rivals.index(self._label(own))] + MARGIN
+            for i in np.flatnonzero(clearly & (mean_squares[best, alike] < PLAUSIBLE)).tolist():
+                found[some[i]] = rivals[best[i]]
+        return found
 
     def _label(self, own: Primitive) -> str:
         found = [label for label, primitive in self._primitives.items() if primitive is own]

@@ -11,6 +11,7 @@ Under each the execution is a draw from a Gaussian over paths. The explanation w
 explain what came after its onset about as well as ordinary executions are explained.
 """
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +21,7 @@ from probdmp.checks import FloatArray, IntArray
 from probdmp.detection.evidence import DEGREES_OF_FREEDOM
 from probdmp.detection.path_model import PathModel
 from probdmp.detection.phase_clock import TICKS
-from probdmp.detection.windows import whitened
+from probdmp.detection.point_densities import densities_of_points
 
 __all__ = ["LOOKED_AT", "Diagnosis", "diagnose"]
 
@@ -72,26 +73,55 @@ def diagnose(
     """
     n_rest = np.minimum(REST_TICKS[0] + seen_since, REST_TICKS[1])
     held = _are_held(means, recent, ticks, REST_EXTENT + 1.5 * noise_stds, n_rest)
+    found = [Diagnosis("timing", "held")] * len(ticks)
+    back = LOOKED_AT[recent.shape[1] > LOOKED_AT]
+    points = recent[:, -1 - back]
+    points[np.isnan(points).any(axis=2)] = np.nan
+    longest = np.max(np.where(np.isnan(points[..., 0]), 0, back), axis=1, initial=0)
+    for length in np.unique(longest[~held]).tolist():
+        some = np.flatnonzero(~held & (longest == length))
+        causes = _explained(model, means[some], points[some][:, back <= length], ticks[some], _explanations(length))
+        for k, cause in zip(some.tolist(), causes, strict=True):
+            found[k] = cause
+    return found
+
+
+def _explained(
+    model: PathModel, means: FloatArray, points: FloatArray, ticks: IntArray, explanations: "_Explanations"
+) -> list[Diagnosis]:
+    """What happened to n executions that are not held, by the points (n, P, D) that explanations are about."""
+    executions = np.arange(len(ticks))
+    phases = np.rint((ticks[:, None] - explanations.back)[:, None] - explanations.lost).astype(np.int64)
+    phases = np.minimum(np.maximum(phases, 0), TICKS)
+    residuals = points[:, None] - means[executions[:, None, None], phases]
+    (n, n_explanations, n_points, dof), aside = residuals.shape, np.broadcast_to(explanations.aside, phases.shape)
+    density, squares = densities_of_points(
+        model.covariance[None],
+        model.noise_variances[None],
+        phases.reshape(1, -1, n_points),
+        aside.reshape(1, -1, n_points),
+        residuals.reshape(1, -1, n_points, dof),
+    )
+    density = density.reshape(n, n_explanations)
+    best = np.argmax(density, axis=1)
+    follows = _follow(squares.reshape(residuals.shape)[executions, best], points, explanations.later[best])
+    certain = (density[executions, best] >= density[:, 0] + CLEARLY) & (follows <= FOLLOWS)
     return [
-        Diagnosis("timing", "held") if is_held else _explained(model, mean, path, int(tick))
-        for is_held, mean, path, tick in zip(held.tolist(), means, recent, ticks, strict=True)
+        _pace(speed) if is_certain and speed != 1 else Diagnosis("motion", "off the path")
+        for is_certain, speed in zip(certain.tolist(), explanations.speeds[best].tolist(), strict=True)
     ]
 
 
-def _explained(model: PathModel, means: FloatArray, recent: FloatArray, tick: int) -> Diagnosis:
-    """What happened to one execution that is not held."""
-    back = LOOKED_AT[len(recent) > LOOKED_AT]
-    back = back[~np.isnan(recent[-1 - back]).any(axis=1)]
-    explanations = _explanations(int(back.max()) if len(back) else 0)
-    if len(explanations.onsets) < 2:
-        return Diagnosis("motion", "off the path")
-    density, follows = _fit(model, means, recent[-1 - back], tick - back, tick, explanations)
-    best, speed = int(np.argmax(density)), float(explanations.speeds[np.argmax(density)])
-    if speed == 1 or density[best] < density[0] + CLEARLY or follows[best] > FOLLOWS:
-        return Diagnosis("motion", "off the path")
-    if speed == 0:
-        return Diagnosis("timing", "paused")
-    return Diagnosis("timing", "slow" if speed < 1 else "fast")
+def _pace(speed: float) -> Diagnosis:
+    return Diagnosis("timing", "paused" if speed == 0 else "slow" if speed < 1 else "fast")
+
+
+def _follow(squares: FloatArray, points: FloatArray, later: NDArray[np.bool_]) -> FloatArray:
+    """(n,) array: squared deviation per number after the onset, (n, P) says which those are, relative to that before."""
+    seen = ~np.isnan(points)
+    after, n_after = (np.where(later[..., None], x, 0).sum(axis=(1, 2)) for x in (squares, seen))
+    before, n_before = squares.sum(axis=(1, 2)) - after, seen.sum(axis=(1, 2)) - n_after
+    return after / np.maximum(n_after, 1) / ((DEGREES_OF_FREEDOM + before) / (DEGREES_OF_FREEDOM + n_before))
 
 
 def _are_held(
@@ -104,74 +134,51 @@ def _are_held(
     extents : (D,) array, root mean square by which what is at rest still seems to move.
     n_rest : (n,) array: ticks that count.
     """
-    n_ticks, executions = recent.shape[1], np.arange(len(recent))
-    is_latest = np.arange(n_ticks) >= n_ticks - n_rest[:, None]
-    counted = is_latest & ~np.isnan(recent).any(axis=2)
-    latest, counts = np.where(counted[..., None], recent, 0.0), np.maximum(counted.sum(axis=1), 1)[:, None]
-    places = latest.sum(axis=1) / counts
-    away = recent - places[:, None]
-    spread = np.sqrt(np.sum(np.where(counted[..., None], away, 0.0) ** 2, axis=1) / counts)
-    at_rest = (counted.sum(axis=1) >= REST_TICKS[0]) & np.all(spread <= extents, axis=1)
-    moved = np.any(np.abs(away) > 3 * extents, axis=2)[:, ::-1]
-    since = np.where(moved.any(axis=1), np.argmax(moved, axis=1), np.minimum(ticks + 1, n_ticks))
-    due = means[executions, np.minimum(ticks, TICKS)] - means[executions, np.clip(ticks - since, 0, TICKS)]
-    return np.asarray(at_rest & np.any(np.abs(due) > np.maximum(5 * extents, LEAST_DUE), axis=1))
+    latest = recent[:, -max(REST_TICKS) :]
+    is_latest = np.arange(-latest.shape[1], 0) >= -n_rest[:, None]
+    counted = is_latest & ~np.isnan(latest).any(axis=2)
+    counts = np.maximum(counted.sum(axis=1), 1)[:, None]
+    places = np.where(counted[..., None], latest, 0.0).sum(axis=1) / counts
+    away = np.where(counted[..., None], latest - places[:, None], 0.0)
+    held = (counted.sum(axis=1) >= REST_TICKS[0]) & np.all(np.sqrt(np.sum(away**2, axis=1) / counts) <= extents, axis=1)
+    some, n_ticks = np.flatnonzero(held), recent.shape[1]
+    moved = np.any(np.abs(recent[some] - places[some, None]) > 3 * extents, axis=2)[:, ::-1]
+    since = np.where(moved.any(axis=1), np.argmax(moved, axis=1), np.minimum(ticks[some] + 1, n_ticks))
+    due = means[some, np.minimum(ticks[some], TICKS)] - means[some, np.clip(ticks[some] - since, 0, TICKS)]
+    held[some] = np.any(np.abs(due) > np.maximum(5 * extents, LEAST_DUE), axis=1)
+    return held
 
 
 class _Explanations(NamedTuple):
-    """(E,) arrays, one entry for each; the first is that nothing happened."""
+    """E of them for P points; the first is that nothing happened. Read-only."""
 
-    onsets: FloatArray
-    """Ticks before now."""
+    back: IntArray
+    """(P,) array: ticks before now at which an execution is compared with its path."""
     speeds: FloatArray
-    lengths: FloatArray
-    """Ticks at that speed."""
-    rises: FloatArray
-    """Ticks in which the movement is pushed aside for good; infinite if it is not."""
-    widths: FloatArray
-    """Ticks in which it is pushed aside and comes back; 0 if it is not."""
+    """(E,) array: 1 but for a pace."""
+    later: NDArray[np.bool_]
+    """(E, P) array: whether a point comes after the onset."""
+    lost: FloatArray
+    """(E, P) array: u - phi(u), ticks."""
+    aside: FloatArray
+    """(E, P) array: g, fractions of the range."""
 
 
+@lru_cache(maxsize=len(LOOKED_AT))
 def _explanations(longest: int) -> _Explanations:
+    """Of what happened in the last ticks, so many at the most."""
     onsets = [onset for onset in ONSETS if onset < longest]
     nothing = [(0, 1.0, 0, np.inf, 0)]
     paces = [(o, r, 10 * TICKS, np.inf, 0) for o in onsets for r in SPEEDS]
     pauses = [(o, 0.0, w, np.inf, 0) for o in onsets for w in PAUSES if w < o]
     aside = [(o, 1.0, 0, rise, 0) for o in onsets for rise in RISES]
     pushes = [(o, 1.0, 0, np.inf, width) for o in onsets for width in WIDTHS]
-    return _Explanations(*np.array(nothing + paces + pauses + aside + pushes).T)
-
-
-def _fit(
-    model: PathModel, means: FloatArray, path: FloatArray, ticks: FloatArray, now: int, explanations: _Explanations
-) -> tuple[FloatArray, FloatArray]:
-    """How well each explanation fits a path (P, D) at its ticks (P,).
-
-    Returns
-    -------
-    Log-density of a multivariate t but for a constant; squared deviation per number after the onset, relative to that before.
-    (E,) arrays.
-    """
-    (points, dof), count = path.shape, len(explanations.onsets)
-    since = np.maximum(ticks - (now - explanations.onsets[:, None]), 0)  # ticks since the onset, (E, P)
-    lost = (1 - explanations.speeds[:, None]) * np.minimum(since, explanations.lengths[:, None])
-    phases = np.clip(np.rint(ticks - lost).astype(int), 0, TICKS)
-    widths = explanations.widths[:, None]
-    bumps = np.where(since < widths, np.sin(np.pi * since / np.maximum(widths, 1)) ** 2, 0.0)
-    aside = ASIDE_STD * (np.minimum(since / explanations.rises[:, None], 1.0) + bumps)
-    rows = (phases[..., None] * dof + np.arange(dof)).reshape(count, points * dof)
-    covariances = model.covariance.ravel().take(rows[:, :, None] * model.means.size + rows[:, None, :])
-    by_dof = covariances.reshape(count, points, dof, points, dof)
-    moved = aside[:, :, None] * aside[:, None, :]
-    for d in range(dof):
-        by_dof[:, :, d, :, d] += moved
-    covariances[:, np.arange(points * dof), np.arange(points * dof)] += np.tile(model.noise_variances, points)
-    white, logarithms = whitened(covariances, (path - means[phases]).reshape(count, -1))
-    squares, determinants = white.reshape(count, points, dof) ** 2, logarithms.sum(axis=-1)
-    nu, size = DEGREES_OF_FREEDOM, points * dof
-    density = -determinants - (nu + size) / 2 * np.log1p(squares.sum(axis=(1, 2)) / nu)
-    later = since > 0
-    after = np.where(later[:, :, None], squares, 0.0).sum(axis=(1, 2))
-    n_after = dof * later.sum(axis=1)
-    sloppiness = (nu + squares.sum(axis=(1, 2)) - after) / (nu + size - n_after)
-    return density, after / np.maximum(n_after, 1) / sloppiness
+    onset, speed, length, rise, width = np.array(nothing + paces + pauses + aside + pushes).T[..., None]
+    back = LOOKED_AT[longest >= LOOKED_AT]
+    since = np.maximum(onset - back, 0)
+    bumps = np.where(since < width, np.sin(np.pi * since / np.maximum(width, 1)) ** 2, 0.0)
+    lost = (1 - speed) * np.minimum(since, length)
+    found = _Explanations(back, speed[:, 0], since > 0, lost, ASIDE_STD * (np.minimum(since / rise, 1.0) + bumps))
+    for array in found:
+        array.flags.writeable = False
+    return found

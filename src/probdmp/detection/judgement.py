@@ -16,7 +16,7 @@ from probdmp.detection.calibrated_monitor import LOOKED_AT_AGAIN
 from probdmp.detection.calibration import Calibration
 from probdmp.detection.expectation import Expectation
 from probdmp.detection.movement_channels import as_evidence, as_values
-from probdmp.detection.reasons import LOOKED_BACK, REMEMBERED, better_fit, reasons_for, signal_shares
+from probdmp.detection.reasons import LOOKED_BACK, REMEMBERED, better_fits, reasons_for, signal_shares
 from probdmp.detection.recorded_sensors import NEVER
 from probdmp.detection.recorded_ticks import RecordedTicks
 from probdmp.detection.sensor_watch import CAUSES
@@ -25,6 +25,8 @@ from probdmp.dmp.phase import phases_at
 
 __all__ = ["Standard", "Verdicts", "joined", "judge_recorded"]
 
+EXPLAINED_AT_ONCE = 64
+"""Executions whose alarms are explained at once."""
 TIE = 1e-12
 """Relative difference up to which surprises are the same."""
 
@@ -201,19 +203,27 @@ def _reasons(
     texts[0, by_silence], texts[1, by_silence] = "data missing", "nothing measured"
     is_faulty = recorded.sensors.faulty_from < NEVER
     texts[0, is_faulty], texts[1, is_faulty] = "sensor", [CAUSES[c] for c in recorded.sensors.causes[is_faulty]]
-    chosen, paths = np.flatnonzero(by_tick & ~is_faulty), recorded.paths[..., : expectation.primitive.n_dof]
-    if not len(chosen):
-        return texts
-    later = np.array(LOOKED_AT_AGAIN)
+    chosen = np.flatnonzero(by_tick & ~is_faulty)
+    for begin in range(0, len(chosen), EXPLAINED_AT_ONCE):
+        some = chosen[begin : begin + EXPLAINED_AT_ONCE]
+        texts[:, some] = _seen_in_movement(expectation, recorded, moments, some, durations[some])
+    return texts
+
+
+def _seen_in_movement(
+    expectation: Expectation, recorded: RecordedTicks, moments: _Moments, chosen: IntArray, durations: FloatArray
+) -> NDArray[np.object_]:
+    """The same of n executions whose ticks have raised an alarm, (3, n) array."""
+    paths, later = recorded.paths[chosen, :, : expectation.primitive.n_dof], np.array(LOOKED_AT_AGAIN)
     is_there = moments.ticks[chosen, None] + later < recorded.counts[chosen, None]
     since = np.where(is_there, later, 0).max(axis=1)
     ticks = _shown(recorded.steps[chosen], moments.ticks[chosen] + since)
     back = ticks[:, None] + np.arange(1 - LOOKED_BACK, 1)
-    recent = np.where((back >= 0)[..., None], paths[chosen[:, None], np.maximum(back, 0)], np.nan)
+    recent = np.where((back >= 0)[..., None], paths[np.arange(len(paths))[:, None], np.maximum(back, 0)], np.nan)
     means = expectation.trajectory.model.means_for(recorded.goals[chosen])
     reasons = reasons_for(expectation, means, recent, ticks, moments.channels[chosen], since)
-    for k, tick, (kind, cause) in zip(chosen.tolist(), ticks.tolist(), reasons, strict=True):
-        is_motion = kind == "motion"
-        better = better_fit(expectation, paths[k, : min(tick, REMEMBERED) + 1], float(durations[k])) if is_motion else ""
-        texts[:, k] = kind, cause, better
+    motions = [k for k, (kind, _) in enumerate(reasons) if kind == "motion"]
+    begun = [paths[k, : min(ticks[k], REMEMBERED) + 1] for k in motions]
+    texts = np.array([(*reason, "") for reason in reasons], dtype=object).T
+    texts[2, motions] = better_fits(expectation, begun, durations[motions])
     return texts

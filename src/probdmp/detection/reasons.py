@@ -1,6 +1,6 @@
 """Who is to blame for what a channel has noticed, and why it did: the same while an execution runs and of recordings."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from probdmp.detection.innovation_watch import watched_sensors
 from probdmp.detection.phase_clock import TICKS
 from probdmp.detection.trajectory_model import MOVEMENT_CHANNELS, TrajectoryModel
 
-__all__ = ["LOOKED_BACK", "REMEMBERED", "better_fit", "reasons_for", "signal_shares"]
+__all__ = ["LOOKED_BACK", "REMEMBERED", "better_fits", "reasons_for", "signal_shares"]
 
 LOOKED_BACK = int(LOOKED_AT.max()) + 1
 REMEMBERED = 2 * TICKS
@@ -87,7 +87,14 @@ def _about_channel(expectation: Expectation, further: int) -> Diagnosis:
     return Diagnosis("channel", f"unexpected {names[further]}")
 
 
-def better_fit(expectation: Expectation, path: FloatArray, duration: float) -> str:
-    """Label of the primitive of the library that fits a path from the start (T, D) better, if there is one."""
-    times = np.arange(len(path)) * duration / TICKS
-    return expectation.others.better(expectation.primitive, times, path * expectation.primitive.ranges)
+def better_fits(expectation: Expectation, paths: Sequence[FloatArray], durations: FloatArray) -> list[str]:
+    """Labels of the primitives of the library that fit paths better, if there are.
+
+    Parameters
+    ----------
+    paths : n (T, D) arrays from the start, as fractions of the range.
+    durations : (n,) array, seconds.
+    """
+    times = [np.arange(len(path)) * duration / TICKS for path, duration in zip(paths, durations, strict=True)]
+    ranges = expectation.primitive.ranges
+    return expectation.others.better(expectation.primitive, times, [path * ranges for path in paths])

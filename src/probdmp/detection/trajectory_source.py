@@ -9,7 +9,7 @@ from probdmp.detection.diagnosis import Diagnosis
 from probdmp.detection.execution_ticks import ExecutionTicks
 from probdmp.detection.expectation import Expectation
 from probdmp.detection.innovation_watch import InnovationWatch
-from probdmp.detection.reasons import LOOKED_BACK, REMEMBERED, better_fit, reasons_for, signal_shares
+from probdmp.detection.reasons import LOOKED_BACK, REMEMBERED, better_fits, reasons_for, signal_shares
 from probdmp.detection.sensor_watch import SensorWatch
 from probdmp.detection.trajectory_model import MOVEMENT_CHANNELS, TrajectoryFollower
 from probdmp.dmp import Task
@@ -86,7 +86,7 @@ class TrajectorySource:
 
     def better(self) -> str:
         """Label of the primitive of the library that fits better, if there is one."""
-        return better_fit(self._expectation, np.stack(self._history), float(self._task.duration))
+        return better_fits(self._expectation, [np.stack(self._history)], np.array([self._task.duration]))[0]
 
     @property
     def sensors(self) -> SensorWatch:

@@ -18,7 +18,7 @@ from probdmp.detection.phase_clock import TICKS
 from probdmp.detection.window_maps import WindowInputs, linear_maps
 from probdmp.gaussian import kernels
 
-__all__ = ["PathWindows", "WhiteWindows", "gather", "inverse_of_cholesky", "whitened"]
+__all__ = ["PathWindows", "WhiteWindows", "gather", "inverse_of_cholesky", "whitened", "whitened_points"]
 
 LOSSY_AT_ONCE = 64
 """Windows of which something was not seen that are factorised at once."""
@@ -51,13 +51,29 @@ def inverse_of_cholesky(covariances: FloatArray) -> FloatArray:
 
 
 def whitened(covariances: FloatArray, residuals: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """L^-1 r of positive definite matrices L L^T (…, n, n) and residuals (…, n), and the logarithms of the diagonals of L."""
-    size = residuals.shape[-1]
-    white, diagonals = np.empty((2, *residuals.shape))
-    flat = (np.ascontiguousarray(array).reshape(-1, *array.shape[residuals.ndim - 1 :]) for array in (covariances, residuals))
-    if not kernels.whiten(*flat, white.reshape(-1, size), diagonals.reshape(-1, size)):
+    """L^-1 r of positive definite matrices L L^T (…, n, n) and residuals (…, n), and the logarithms of the diagonals of L.
+
+    Of each it is what was seen, where residuals are not NaN, whitened by itself; zero elsewhere.
+    """
+    count, size = covariances[..., 0, 0].size, residuals.shape[-1]
+    # One point of n numbers on each path
+    phases, aside, certain = np.zeros((count, 1, 1), dtype=np.int64), np.zeros((count, 1, 1)), np.zeros((count, size))
+    one = covariances.reshape(count, 1, size, 1, size), certain, phases, aside, residuals.reshape(count, 1, 1, size)
+    white, logarithms = whitened_points(*one)
+    return white.reshape(residuals.shape), logarithms.reshape(residuals.shape)
+
+
+def whitened_points(
+    covariances: FloatArray, noise_variances: FloatArray, phases: IntArray, aside: FloatArray, residuals: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """The same of points on K paths, by E accounts of each; arrays as of `probdmp.detection.point_densities`."""
+    white, logarithms = np.empty((2, *residuals.shape))
+    n_numbers = covariances.shape[1] * covariances.shape[2]
+    flat = covariances.reshape(-1, n_numbers, n_numbers)
+    given = (np.ascontiguousarray(array) for array in (flat, noise_variances, phases, aside, residuals))
+    if not kernels.whiten(*given, white, logarithms):
         raise np.linalg.LinAlgError("Matrix is not positive definite")
-    return white, np.log(diagonals)
+    return white, logarithms
 
 
 def _invert_triangles(factors: FloatArray, inverses: FloatArray) -> None:
@@ -246,9 +262,6 @@ class PathWindows:
 
     def _without_unseen(self, rows: IntArray, residuals: FloatArray) -> tuple[FloatArray, FloatArray]:
         """What was seen of windows (W, S, size) whitened by itself: z and the logarithms of the diagonal, zero elsewhere."""
-        size, seen = residuals.shape[-1], ~np.isnan(residuals)
-        covariances = self._covariances(tick_pairs(self._ticks[rows]))[..., :size, :size]
-        # What was not seen is given a variance of its own and a deviation of zero, which says nothing of the rest.
-        covariances = np.where(seen[..., None] & seen[..., None, :], covariances, np.eye(size))
-        white, logarithms = whitened(covariances, np.where(seen, residuals, 0.0))
+        size = residuals.shape[-1]
+        white, logarithms = whitened(self._covariances(tick_pairs(self._ticks[rows]))[..., :size, :size], residuals)
         return white, -logarithms

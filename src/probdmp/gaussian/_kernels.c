@@ -31,7 +31,7 @@
 
 #define MOST_STATES 4
 #define OUTPUTS 4 /* rows of maps that are multiplied with a window at once */
-#define ROWS 4 /* of a covariance that are changed at once */
+#define ROWS 4 /* of a covariance that are changed, or factorised, at once */
 #define TILE 64 /* observations of each that are brought side by side at a time */
 #define LARGEST_MAGNITUDE 1e100 /* see checks.py */
 #define LOG_2PI 1.8378770664093453
@@ -201,6 +201,17 @@ typedef struct {
     const int64_t *after;
 } Recordings;
 
+/* Points that were measured on paths, with noise, under accounts of where they are and how far they were pushed aside; see `whiten`
+   in _recordings_numpy.py. */
+typedef struct {
+    Py_ssize_t n_paths, n_accounts, n_points, n_dof, n_numbers; /* accounts of each path; numbers of a path */
+    const double *covariances, *variances, *aside, *residuals;
+    const int64_t *phases;
+    double *white, *logarithms;
+    double *triangle, *pushes; /* to work in */
+    int64_t *numbers;
+} Points;
+
 /* Groups of states that move on top of z, which stands still; see augmented_steps.py. There are n_outputs = n_groups size outputs. */
 typedef struct {
     Py_ssize_t n_groups, size, n_states, width, block, n_outputs, n_latent, n_gains;
@@ -270,6 +281,11 @@ typedef struct {
 
 #define minus_product NAMED(minus_product)
 #define root NAMED(root)
+#define gather_points NAMED(gather_points)
+#define push_aside NAMED(push_aside)
+#define forget_unseen NAMED(forget_unseen)
+#define solve_column NAMED(solve_column)
+#define factorise_rows NAMED(factorise_rows)
 #define factorise_lane NAMED(factorise_lane)
 #define whiten_all NAMED(whiten_all)
 
@@ -807,25 +823,45 @@ static PyObject *window_sums(PyObject *module, PyObject *const *arguments, Py_ss
     return NULL;
 }
 
-/* ---- Small matrices ----------------------------------------------------------------------------------------------------- */
+/* ---- Points of paths ---------------------------------------------------------------------------------------------------- */
 
 static PyObject *whiten(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
 {
     static const Spec specs[] = {
-        {"covariances", 0, 3, 0}, {"residuals", 0, 2, 0}, {"white", 1, 2, 0}, {"diagonals", 1, 2, 0},
+        {"covariances", 0, 3, 0}, {"variances", 0, 2, 0}, {"phases", 0, 3, 1}, {"aside", 0, 3, 0}, {"residuals", 0, 4, 0},
+        {"white", 1, 4, 0}, {"logarithms", 1, 4, 0},
     };
     enum { COUNT = sizeof(specs) / sizeof(specs[0]) };
     Array x[COUNT];
     if (take(arguments, given, specs, COUNT, x) < 0) return NULL;
-    const Py_ssize_t count = x[1].view.shape[0], n = x[1].view.shape[1];
-    int is_positive = 0, done = agree(&x[0], "covariances", count, n, n, 0) && agree(&x[2], "white", count, n, 0, 0)
-                                && agree(&x[3], "diagonals", count, n, 0, 0);
+    const Py_ssize_t k = x[4].view.shape[0], e = x[4].view.shape[1], p = x[4].view.shape[2], d = x[4].view.shape[3], n = p * d;
+    Points s = {
+        .n_paths = k, .n_accounts = e, .n_points = p, .n_dof = d, .n_numbers = x[0].view.shape[1], .covariances = x[0].data,
+        .variances = x[1].data, .phases = x[2].integers, .aside = x[3].data, .residuals = x[4].data, .white = x[5].data,
+        .logarithms = x[6].data,
+    };
+    int is_positive = 0, done = agree(&x[0], "covariances", k, s.n_numbers, s.n_numbers, 0) && agree(&x[1], "variances", k, d, 0, 0)
+                                && agree(&x[2], "phases", k, e, p, 0) && agree(&x[3], "aside", k, e, p, 0)
+                                && agree(&x[5], "white", k, e, p, d) && agree(&x[6], "logarithms", k, e, p, d);
+    if (done && n >> 24) {
+        PyErr_Format(PyExc_ValueError, "residuals: expected few numbers of each account, got %zd", n);
+        done = 0;
+    }
+    for (Py_ssize_t i = 0; done && i < k * e * p; i++)
+        if (s.phases[i] < 0 || s.phases[i] >= s.n_numbers || (s.phases[i] + 1) * d > s.n_numbers) {
+            PyErr_Format(PyExc_ValueError, "phases: expected points of paths of %zd numbers", s.n_numbers);
+            done = 0;
+        }
     if (done) {
-        double *work = malloc((n * (n + 1) / 2 + n + 1) * WIDTH * sizeof(double));
+        const Py_ssize_t size = (n + 1) * (n + 2) / 2 * WIDTH;
+        double *work = malloc((size + (p + n) * WIDTH) * sizeof(double));
+        s.triangle = work;
+        s.pushes = work + size;
+        s.numbers = (int64_t *)(s.pushes + p * WIDTH);
         done = work != NULL;
         if (done) {
             Py_BEGIN_ALLOW_THREADS
-            is_positive = CHOOSE(whiten_all)(count, n, x[0].data, x[1].data, work, x[2].data, x[3].data);
+            is_positive = CHOOSE(whiten_all)(&s);
             Py_END_ALLOW_THREADS
         } else
             PyErr_NoMemory();
@@ -1858,51 +1894,115 @@ static void square_window(const OneWindow *s, double *sums)
     }
 }
 
-/* ---- Small matrices ----------------------------------------------------------------------------------------------------- */
+/* ---- Points of paths ---------------------------------------------------------------------------------------------------- */
 
-/* L and L^-1 r of WIDTH matrices L L^T, row by row, in place: of the lower triangle, and of r. */
-INLINE void factorise_lane(Py_ssize_t n, double *triangle, double *residual)
+/* Where a row of the lower triangles of WIDTH matrices begins. */
+#define ROW(triangle, i) ((triangle) + (i) * ((i) + 1) / 2 * WIDTH)
+
+/* What WIDTH accounts from one on say, side by side: the lower triangles of the covariances, one more row below for the residuals. */
+INLINE void gather_points(const Points *s, Py_ssize_t first, Py_ssize_t count)
 {
-    const Lane zero = everywhere(0.0), one = everywhere(1.0);
-    for (Py_ssize_t i = 0; i <= n; i++) { /* r is one more row */
-        double *row = i < n ? triangle + i * (i + 1) / 2 * WIDTH : residual;
-        for (Py_ssize_t j = 0; j < (i < n ? i : n); j++) {
-            const double *above = triangle + j * (j + 1) / 2 * WIDTH;
-            Lane sum = load(row + j * WIDTH);
-            for (Py_ssize_t k = 0; k < j; k++) sum = minus_product(sum, load(row + k * WIDTH), load(above + k * WIDTH));
-            store(row + j * WIDTH, plus_product(zero, sum, load(above + j * WIDTH)));
+    const Py_ssize_t d = s->n_dof, p = s->n_points, n = p * d;
+    const double *covariance[WIDTH], *variances[WIDTH], *row[WIDTH];
+    for (int w = 0; w < WIDTH; w++) {
+        const Py_ssize_t account = first + w < count ? first + w : first, path = account / s->n_accounts;
+        covariance[w] = s->covariances + path * s->n_numbers * s->n_numbers;
+        variances[w] = s->variances + path * d;
+        for (Py_ssize_t i = 0; i < n; i++) {
+            s->numbers[i * WIDTH + w] = s->phases[account * p + i / d] * d + i % d;
+            ROW(s->triangle, n)[i * WIDTH + w] = s->residuals[account * n + i];
         }
-        if (i == n) break;
-        Lane sum = load(row + i * WIDTH);
-        for (Py_ssize_t k = 0; k < i; k++) sum = minus_product(sum, load(row + k * WIDTH), load(row + k * WIDTH));
-        store(row + i * WIDTH, quotient(one, root(sum))); /* one over the diagonal */
+        for (Py_ssize_t i = 0; i < p; i++) s->pushes[i * WIDTH + w] = s->aside[account * p + i];
+    }
+    for (Py_ssize_t i = 0; i < n; i++) {
+        double *to = ROW(s->triangle, i);
+        for (int w = 0; w < WIDTH; w++) row[w] = covariance[w] + s->numbers[i * WIDTH + w] * s->n_numbers;
+        for (Py_ssize_t j = 0; j <= i; j++)
+            for (int w = 0; w < WIDTH; w++) to[j * WIDTH + w] = row[w][s->numbers[j * WIDTH + w]];
+        for (int w = 0; w < WIDTH; w++) to[i * WIDTH + w] += variances[w][i % d];
     }
 }
 
-/* Whether all matrices are positive definite; else what is written is not to be used. */
-static int whiten_all(Py_ssize_t count, Py_ssize_t n, const double *covariances, const double *residuals, double *work, double *white,
-                      double *diagonals)
+/* Each degree of freedom is pushed by itself. */
+INLINE void push_aside(const Points *s)
 {
-    double *triangle = work, *residual = work + n * (n + 1) / 2 * WIDTH;
+    const Py_ssize_t d = s->n_dof;
+    for (Py_ssize_t i = 0; i < s->n_points * d; i++) {
+        const Lane own = load(s->pushes + i / d * WIDTH);
+        for (Py_ssize_t q = 0; q <= i / d; q++) {
+            double *both = ROW(s->triangle, i) + (q * d + i % d) * WIDTH;
+            store(both, plus_product(load(both), own, load(s->pushes + q * WIDTH)));
+        }
+    }
+}
+
+/* What was not seen is given a variance of its own and a residual of zero, which says nothing of the rest. */
+INLINE void forget_unseen(Py_ssize_t n, double *triangle, int w)
+{
+    double *residuals = ROW(triangle, n) + w;
+    for (Py_ssize_t i = 0; i < n; i++) {
+        if (!isnan(residuals[i * WIDTH])) continue;
+        for (Py_ssize_t j = 0; j < i; j++) ROW(triangle, i)[j * WIDTH + w] = 0;
+        for (Py_ssize_t j = i; j <= n; j++) ROW(triangle, j)[i * WIDTH + w] = j == i;
+    }
+}
+
+/* Column j of rows of L from i >= j on, in place; of the diagonal one over it is kept. */
+INLINE void solve_column(int n_rows, double *triangle, Py_ssize_t i, Py_ssize_t j)
+{
+    double *above = ROW(triangle, j);
+    const Lane zero = everywhere(0.0);
+    Lane sum[ROWS];
+    UNROLL for (int r = 0; r < n_rows; r++) sum[r] = load(ROW(triangle, i + r) + j * WIDTH);
+    for (Py_ssize_t k = 0; k < j; k++) {
+        const Lane x = load(above + k * WIDTH);
+        UNROLL for (int r = 0; r < n_rows; r++) sum[r] = minus_product(sum[r], load(ROW(triangle, i + r) + k * WIDTH), x);
+    }
+    if (i == j) store(above + j * WIDTH, quotient(everywhere(1.0), root(sum[0])));
+    const Lane scale = load(above + j * WIDTH);
+    UNROLL for (int r = i == j; r < n_rows; r++) store(ROW(triangle, i + r) + j * WIDTH, plus_product(zero, sum[r], scale));
+}
+
+INLINE void factorise_rows(int n_rows, Py_ssize_t n, double *triangle, Py_ssize_t i)
+{
+    for (Py_ssize_t j = 0; j < i; j++) solve_column(n_rows, triangle, i, j);
+    UNROLL for (int r = 0; r < n_rows; r++)
+        if (i + r < n) solve_column(n_rows - r, triangle, i + r, i + r);
+}
+
+/* L, and in row n L^-1 r, of WIDTH matrices L L^T and residuals r, in place. */
+INLINE void factorise_lane(Py_ssize_t n, double *triangle)
+{
+    for (Py_ssize_t i = 0; i <= n; i += ROWS) {
+#define BODY(n_rows) factorise_rows(n_rows, n, triangle, i)
+        WITH_STATES(n + 1 - i < ROWS ? n + 1 - i : ROWS, BODY) /* of rows, too, there are 1 to 4 */
+#undef BODY
+    }
+}
+
+/* Whether all covariances are positive definite; else what is written is not to be used. */
+static int whiten_all(const Points *s)
+{
+    const Py_ssize_t n = s->n_points * s->n_dof, count = n ? s->n_paths * s->n_accounts : 0;
     int is_positive = 1;
     for (Py_ssize_t first = 0; first < count; first += WIDTH) {
-        for (int w = 0; w < WIDTH; w++) {
-            const Py_ssize_t own = first + w < count ? first + w : first;
-            for (Py_ssize_t i = 0, at = 0; i < n; i++)
-                for (Py_ssize_t j = 0; j <= i; j++, at++) triangle[at * WIDTH + w] = covariances[(own * n + i) * n + j];
-            for (Py_ssize_t i = 0; i < n; i++) residual[i * WIDTH + w] = residuals[own * n + i];
-        }
-        factorise_lane(n, triangle, residual);
-        for (int w = 0; w < WIDTH && first + w < count; w++)
-            for (Py_ssize_t i = 0; i < n; i++) {
-                const double diagonal = 1 / triangle[(i * (i + 1) / 2 + i) * WIDTH + w];
-                white[(first + w) * n + i] = residual[i * WIDTH + w];
-                diagonals[(first + w) * n + i] = diagonal;
-                is_positive &= diagonal > 0 && diagonal < INFINITY;
+        gather_points(s, first, count);
+        push_aside(s);
+        for (int w = 0; w < WIDTH; w++) forget_unseen(n, s->triangle, w);
+        factorise_lane(n, s->triangle);
+        for (Py_ssize_t i = 0; i < n; i++) {
+            double *white = ROW(s->triangle, n) + i * WIDTH, *diagonal = ROW(s->triangle, i) + i * WIDTH;
+            store(diagonal, times(-1.0, logarithm(load(diagonal))));
+            for (int w = 0; w < WIDTH && first + w < count; w++) {
+                s->white[(first + w) * n + i] = white[w];
+                s->logarithms[(first + w) * n + i] = diagonal[w];
+                is_positive &= isfinite(diagonal[w]) != 0;
             }
+        }
     }
     return is_positive;
 }
+#undef ROW
 
 /* ---- Recordings --------------------------------------------------------------------------------------------------------- */
 

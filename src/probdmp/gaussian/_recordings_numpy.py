@@ -229,27 +229,53 @@ def window_ratios(
     ratios[~(ratios > floors)] = -np.inf
 
 
-def whiten(covariances: FloatArray, residuals: FloatArray, white: FloatArray, diagonals: FloatArray) -> bool:
-    """Residuals of small Gaussians as white noise, L^-1 r of covariances L L^T; whether all of these are positive definite.
+def whiten(
+    covariances: FloatArray,
+    variances: FloatArray,
+    phases: IntArray,
+    aside: FloatArray,
+    residuals: FloatArray,
+    white: FloatArray,
+    logarithms: FloatArray,
+) -> bool:
+    """Points measured on Gaussian paths as white noise, L^-1 r, of E accounts for each of K paths.
 
-    One more row under the matrix makes the factorisation find it on its way: the last row of its factor is (L^-1 r)^T.
+    By an account, points are at phases of the path, and pushed aside by g b, b ~ N(0, I), besides noise: the covariance of two
+    of them, p and q, in L L^T is C[phase_p, phase_q] + g_p g_q I, and diag(variances) more where p = q.
 
     Parameters
     ----------
-    covariances, residuals : (U, n, n) and (U, n) arrays; of the first only the lower triangle is looked at.
-    white : written, (U, n).
-    diagonals : of L, written, (U, n).
+    covariances, variances : (K, M D, M D) and (K, D) arrays: of D numbers at M phases, and of the noise of each.
+    phases, aside : (K, E, P) arrays: places below M, and g.
+    residuals : r, (K, E, P, D); NaN where nothing was seen.
+    white : written, (K, E, P, D); 0 where nothing was seen.
+    logarithms : of the diagonal of L, written likewise.
+
+    Returns
+    -------
+    Whether all covariances of what was seen are positive definite; else what is written is not to be used.
     """
-    count, size = residuals.shape
+    n_paths, n_accounts, n_points, dof = residuals.shape
+    count, size = n_paths * n_accounts, n_points * dof
+    own, flat = np.repeat(np.arange(n_paths), n_accounts), residuals.reshape(count, size)
+    rows = (phases[..., None] * dof + np.arange(dof)).reshape(count, size)
+    pushes = (aside[..., None, None] * np.eye(dof)).reshape(count, size, dof)
+    noise = np.tile(variances, n_points)[own, :, None] * np.eye(size)
+    found = covariances[own[:, None, None], rows[:, :, None], rows[:, None, :]] + noise + np.matmul(pushes, pushes.mT)
+    # What was not seen is given a variance of its own and a residual of zero, which says nothing of the rest.
+    seen = ~np.isnan(flat)
+    found, known = np.where(seen[:, :, None] & seen[:, None, :], found, np.eye(size)), np.where(seen, flat, 0.0)
+    # One more row under the matrix makes the factorisation find L^-1 r on its way: the last row of its factor is its transpose.
     bordered = np.empty((count, size + 1, size + 1))
-    bordered[:, :size, :size], bordered[:, size, :size] = covariances, residuals
-    bordered[:, :size, size], bordered[:, size, size] = residuals, np.finfo(np.float64).max / 4  # larger than any square
+    bordered[:, :size, :size], bordered[:, size, :size], bordered[:, :size, size] = found, known, known
+    bordered[:, size, size] = np.finfo(np.float64).max / 4  # larger than any square
     try:
         factors = np.linalg.cholesky(bordered)
     except np.linalg.LinAlgError:
         return False
-    white[:], diagonals[:] = factors[:, size, :size], np.diagonal(factors, axis1=1, axis2=2)[:, :size]
-    return bool(np.isfinite(diagonals).all())
+    white[:] = factors[:, size, :size].reshape(white.shape)
+    logarithms[:] = np.log(np.diagonal(factors, axis1=1, axis2=2)[:, :size]).reshape(white.shape)
+    return bool(np.isfinite(logarithms).all())
 
 
 def split_sums(found: FloatArray, wanted: IntArray, n: int) -> list[FloatArray]:
