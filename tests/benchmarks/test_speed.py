@@ -2,6 +2,7 @@
 
 import gc
 import time
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -14,6 +15,13 @@ from speed.page import CAUSES, misses, table, target_lines
 from speed.rows import Row, at_least, at_most, duration_text
 from speed.twin import Twin
 from speed.workload import model_of, recordings_of
+
+
+@pytest.fixture(scope="module", autouse=True)
+def kept_to_the_end() -> Iterator[None]:
+    """As before: contestants leave everything to the collector again."""
+    yield
+    gc.freeze()
 
 
 def test_contestants_take_turns_and_garbage_waits() -> None:
