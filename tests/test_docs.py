@@ -6,9 +6,7 @@ from glob import glob
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
-
-from probdmp.cli import app
+from program import run_program
 
 ROOT = Path(__file__).parent.parent
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -33,7 +31,7 @@ def run_command(line: str) -> None:
     arguments = words[1 : words.index("<")] if "<" in words else words[1:]
     # As a shell does: names for a pattern, or the word as it is.
     arguments = [name for word in arguments for name in (sorted(glob(word)) if "*" in word else []) or [word]]
-    result = CliRunner().invoke(app, arguments, input=given, prog_name="probdmp")
+    result = run_program(arguments, given)
     # 4: monitor has found a failure.
     assert result.exit_code in ((0, 4) if arguments[0] == "monitor" else (0,)), f"{line}: {result.stderr}"
 

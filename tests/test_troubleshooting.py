@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from program import run_program
 from ros_files import ROS_1, joint_state, pose_stamped, write_bag
 from scipy.io import savemat
-from typer.testing import CliRunner
 
 from probdmp import (
     Demonstration,
@@ -25,7 +25,6 @@ from probdmp import (
     synthetic_letters,
     write_demonstrations,
 )
-from probdmp.cli import app
 from probdmp.execution import ChannelSensor, LinearSensor, NonlinearSensor, state_sensor
 from probdmp.plotting.style import require_matplotlib
 
@@ -151,7 +150,7 @@ def messages(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
         learned = dmp()
         learned.save("watched.probdmp", detector(learned))
         ticks = json.dumps({"position": [1.0, 2.0]}) + "\n" + json.dumps({"positions": 3}) + "\n"
-        found += [CliRunner().invoke(app, list(words), input=ticks, prog_name="probdmp").stderr.strip() for words in SAID]
+        found += [run_program(words, ticks).stderr.strip() for words in SAID]
         patch.setattr("probdmp.plotting.style.find_spec", lambda name: None)
         return [*found, _message(require_matplotlib)]
 

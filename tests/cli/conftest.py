@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from program import run_program
 
 from probdmp import FailureDetector, PrimitiveLibrary, ProbabilisticDMP, synthetic_letters, write_demonstrations
-from probdmp.cli import app
 from probdmp.demonstrations import Demonstration, hold
 
 N_BASIS = 8
@@ -34,7 +33,7 @@ def run() -> Callable[..., Any]:
     """`run("fit", path, …)`: the result has exit_code, stdout, stderr."""
 
     def run(*arguments, text=None, env=None):
-        return CliRunner(env=env).invoke(app, [str(a) for a in arguments], input=text, prog_name="probdmp")
+        return run_program([str(a) for a in arguments], text, env)
 
     return run
 
