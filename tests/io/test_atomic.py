@@ -14,17 +14,21 @@ from probdmp.errors import InputError
 from probdmp.io import ModelContents, encode_model, read_model
 from probdmp.io.atomic import write_atomically
 
-SAVE_FOREVER = """
-import sys
+SAVE_UNTIL_KILLED = """
+import os, sys
 from pathlib import Path
 from probdmp.io.atomic import write_atomically
 
 target, *sources = map(Path, sys.argv[1:])
 payloads = [source.read_bytes() for source in sources]
-print("ready", flush=True)
-while True:
-    for payload in payloads:
-        write_atomically(target, payload)
+for line in sys.stdin:
+    saving = os.fork()
+    if not saving:
+        print(os.getpid(), flush=True)
+        while True:
+            for payload in payloads:
+                write_atomically(target, payload)
+    print(os.waitstatus_to_exitcode(os.waitpid(saving, 0)[1]), flush=True)
 """
 
 
@@ -91,19 +95,20 @@ def assert_survives_kills(n_kills, make_primitive, folder):
         source.write_bytes(payload)
     target = folder / "m.probdmp"
     write_atomically(target, payloads[0])
-    for delay in rng.uniform(0, 0.03, n_kills):
-        command = [sys.executable, "-c", SAVE_FOREVER, target, *sources]
-        with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
-            assert process.stdout.readline() == b"ready\n"
+    command, pipe = [sys.executable, "-c", SAVE_UNTIL_KILLED, target, *sources], subprocess.PIPE
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True, bufsize=1) as process:
+        for delay in rng.uniform(0, 0.03, n_kills):
+            process.stdin.write("again\n")
+            saving = int(process.stdout.readline())
             time.sleep(delay)
-            process.send_signal(signal.SIGKILL)
-        assert process.returncode == -signal.SIGKILL
-        assert target.read_bytes() in payloads
-        read_model(target)
+            os.kill(saving, signal.SIGKILL)
+            assert int(process.stdout.readline()) == -signal.SIGKILL
+            assert target.read_bytes() in payloads
+            read_model(target)
 
 
 def test_killed_while_saving(make_primitive, tmp_path):
-    assert_survives_kills(8, make_primitive, tmp_path)
+    assert_survives_kills(20, make_primitive, tmp_path)
 
 
 @pytest.mark.slow
