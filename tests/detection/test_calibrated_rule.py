@@ -34,10 +34,9 @@ def test_online_is_offline(calibrated, varied, executions, kind, told):
 
 
 @pytest.mark.parametrize("kind", ["fine", "hold", "dropout"])
-def test_online_is_offline_for_one_primitive(alone, varied, executions, kind):
-    chosen = [d for d in executions[kind] if d.label == "s"][:1]
-    for told in (True, False) if kind == "dropout" else (kind == "fine",):
-        assert_online_is_offline(alone, varied, chosen, told)
+@pytest.mark.parametrize("told", [True, False])
+def test_online_is_offline_for_one_primitive(alone, varied, executions, kind, told):
+    assert_online_is_offline(alone, varied, [d for d in executions[kind] if d.label == "s"][:1], told)
 
 
 def test_online_is_offline_with_joint_weights(training, executions):

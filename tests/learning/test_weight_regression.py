@@ -163,7 +163,7 @@ def test_a_perfect_fit_has_a_large_but_finite_precision(seed, n_samples, n_weigh
     np.testing.assert_allclose(phi @ w.mean, f, atol=1e-5 * np.abs(f).max())
 
 
-@settings(max_examples=100)
+@settings(max_examples=300)
 @given(
     seeds,
     st.integers(1, 30),

@@ -21,7 +21,7 @@ POSTERIOR = Configuration(forcing_noise="posterior")
 @pytest.fixture(scope="module")
 def trials():
     """Three letters, 10 demonstrations to learn from and 5 to judge, each also blocked."""
-    return tuple(draw_trials(synthetic_letters(15, letters="alz", dt=0.02), Experiment(test=5)))
+    return tuple(draw_trials(synthetic_letters(15, letters="alz"), Experiment(test=5)))
 
 
 @cache
