@@ -104,10 +104,8 @@ def _score_joint(primitive: Primitive, batch: ExecutionBatch, array: SensorArray
     executions = joint_executions(primitive, batch.tasks, np.array([batch.dt]), n_ticks)
     together = array.matrix.shape[1]
     if (array.is_coupled or together > 1) and n_ticks * together > LARGEST_GAUSSIAN:
-        plan, seen = (
-            planned_states(executions).reshape(n_ticks, n_executions, -1),
-            np.ones((n_ticks, n_outputs), dtype=np.bool_),
-        )
+        plan = planned_states(executions).reshape(n_ticks, n_executions, -1)
+        seen = np.ones((n_ticks, n_outputs), dtype=np.bool_)
         schedule = gain_schedule(primitive, take_tasks(batch.tasks, [0]), batch.dt, array, seen)
         return schedule.log_likelihoods(batch.observations - (plan @ array.dense_matrix.T).swapaxes(0, 1))
     key = (*kind_of(primitive, batch.tasks, batch.dt, array), n_ticks)
