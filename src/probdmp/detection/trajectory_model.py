@@ -108,14 +108,14 @@ class TrajectoryModel:
         floors : what evidence that weighs two accounts has to be above to matter; what is not may be -infinity.
         """
         n = paths.shape[-1]
-        evidence = np.full((len(MOVEMENT_CHANNELS) + len(self.feel), len(paths), n), np.nan)
+        evidence = np.empty((len(MOVEMENT_CHANNELS) + len(self.feel), len(paths), n))
         edges = np.linspace(0, n, max(round(n / SIDE_BY_SIDE), 1) + 1).astype(int).tolist()
         for part in starmap(slice, pairwise(edges)):
             self._weigh(paths[..., part], counts[part], goals[part], floors, evidence[..., part])
         return evidence
 
     def _weigh(self, paths: FloatArray, counts: IntArray, goals: FloatArray, floors: Floors, values: FloatArray) -> None:
-        """The same of some of them, into values that are NaN."""
+        """The same of some of them, into values (C, T, n)."""
         unseen, length = np.asarray(np.isnan(paths)), len(paths)
         is_lossy, is_over = unseen.any(), np.arange(length)[:, None] >= counts
         inputs = WindowInputs.of(np.where(unseen, 0.0, paths) if is_lossy else paths, self._whole.ahead(goals).T)
@@ -133,8 +133,10 @@ class TrajectoryModel:
         for evidence, horizons in self._questions:
             wanted = np.maximum(min(length, evidence.last + 1) - np.array(evidence.horizons), 0)
             own = np.ascontiguousarray(least[[horizon.channel for horizon in horizons]])
-            for horizon, found in zip(horizons, evidence.weigh(inputs, wanted, own) if wanted[0] else (), strict=False):
-                values[horizon.channel, horizon.ticks : horizon.ticks + len(found)] = found
+            nothing = [np.empty((0, len(counts)))] * len(horizons)
+            for horizon, found in zip(horizons, evidence.weigh(inputs, wanted, own) if wanted[0] else nothing, strict=True):
+                weighed, until = values[horizon.channel], horizon.ticks + len(found)
+                weighed[: horizon.ticks], weighed[horizon.ticks : until], weighed[until:] = np.nan, found, np.nan
         if means is not None:
             self._weigh_again(values, paths, unseen, means)
         values[:, is_over] = np.nan

@@ -47,14 +47,13 @@ def observations_of(table: ExecutionTable, which: IntArray, names: Sequence[str]
     """Columns of executions that are equally long, (N, T, C) array; NaN where a column is not in the file."""
     starts = table.offsets[which]
     n_samples = int(table.offsets[which[0] + 1] - starts[0])
-    values = np.full((len(which), n_samples, len(names)), np.nan)
+    values = np.empty((len(which), n_samples, len(names)))
     # Whole rows are copied at once where all executions, not only these, are equally long.
     by_rows = bool((np.diff(table.offsets) == n_samples).all())
     places = which if by_rows else starts[:, None] + np.arange(n_samples)
     for i, name in enumerate(names):
-        if name in table.columns:
-            column = table.columns[name]
-            values[:, :, i] = (column.reshape(-1, n_samples) if by_rows else column)[places]
+        column = table.columns.get(name)
+        values[:, :, i] = np.nan if column is None else (column.reshape(-1, n_samples) if by_rows else column)[places]
     return values
 
 

@@ -1,7 +1,7 @@
 """A model that scores tables of executions."""
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -39,7 +39,7 @@ class Scorer:
     """
 
     def __init__(self, payload: bytes, name: str, threads: int = 1) -> None:
-        self._threads = threads
+        self._each: Callable[..., Iterator[None]] = map if threads == 1 else ThreadPoolExecutor(threads).map
         contents = decode_model(payload, name)
         if contents.detector is None:
             hint = "Learn it with probdmp fit, which saves one, or give save() a fitted FailureDetector."
@@ -93,12 +93,7 @@ class Scorer:
         def score(which: IntArray) -> None:  # writes what is about its own executions, and nothing else
             self._score(table, which, int(owners[which[0]]), scores)
 
-        if self._threads == 1:
-            for which in blocks:
-                score(which)
-        else:
-            with ThreadPoolExecutor(self._threads) as pool:
-                list(pool.map(score, blocks))
+        list(self._each(score, blocks))
         names = np.array([*table.labels, None], dtype=object)[table.codes]
         known = np.array([*self._labels, None], dtype=object)[owners]
         return scores.as_table(np.where(owners >= 0, known, names))
