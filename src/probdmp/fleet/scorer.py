@@ -85,6 +85,10 @@ class Scorer:
 
     def score(self, table: ExecutionTable) -> Any:
         """Scores, an Arrow table with a row for each execution."""
+        return self.begin(table)()
+
+    def begin(self, table: ExecutionTable) -> Callable[[], Any]:
+        """The same, begun: threads are at it, and what is returned waits for them."""
         owners = self._owners(table)
         self._check(table, owners)
         scores = Scores(table)
@@ -93,10 +97,15 @@ class Scorer:
         def score(which: IntArray) -> None:  # writes what is about its own executions, and nothing else
             self._score(table, which, int(owners[which[0]]), scores)
 
-        list(self._each(score, blocks))
-        names = np.array([*table.labels, None], dtype=object)[table.codes]
-        known = np.array([*self._labels, None], dtype=object)[owners]
-        return scores.as_table(np.where(owners >= 0, known, names))
+        begun = self._each(score, blocks)
+
+        def ended() -> Any:
+            list(begun)
+            names = np.array([*table.labels, None], dtype=object)[table.codes]
+            known = np.array([*self._labels, None], dtype=object)[owners]
+            return scores.as_table(np.where(owners >= 0, known, names))
+
+        return ended
 
     def _score(self, table: ExecutionTable, which: IntArray, owner: int, scores: Scores) -> None:
         """A block; where it is refused, the executions that are to blame get the reason, the others their scores."""

@@ -5,10 +5,11 @@ import itertools
 import multiprocessing
 import os
 import threading
-from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from operator import itemgetter
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -18,6 +19,7 @@ from probdmp.errors import DataFileError, ProbDMPError
 from probdmp.fleet.plan import Part
 from probdmp.fleet.scorer import Scorer
 from probdmp.io import ExecutionTable, ParquetExecutions
+from probdmp.io.read_ahead import read_ahead
 
 __all__ = ["Assignment", "Worker", "one_thread_each", "process_pool", "score_here", "score_in_processes"]
 
@@ -68,22 +70,22 @@ class Worker:
         self._columns = self._scorer.columns(self._file.layout, self._file.path)
 
     def scores(self, parts: Iterable[Part]) -> Iterator[tuple[int, bytes]]:
-        """Of each part its index and its scores, a Parquet file; the next part is scored meanwhile, and that after it read."""
+        """Of each part its index and its scores, a Parquet file; the next is begun meanwhile, and that after it read."""
         from threadpoolctl import threadpool_limits
 
-        pieces = _ahead((part, table) for part in parts for table in self._file.read(part.span, self._columns))
-        groups = itertools.groupby(pieces, key=lambda piece: piece[0].number)
+        pieces = read_ahead((part, table) for part in parts for table in self._file.read(part.span, self._columns))
         with threadpool_limits(1, "blas"):  # threads share executions; those of the linear algebra would be in their way
-            for of_part in _ahead(list(self._scored(group)) for _, group in groups):
-                yield of_part[0][0].number, _payload([table for _, table in of_part])
+            for number, begun in itertools.groupby(_one_behind(self._begun(pieces)), key=itemgetter(0)):
+                yield number, _payload([ended() for _, ended in begun])
 
-    def _scored(self, pieces: Iterable[tuple[Part, ExecutionTable]]) -> Iterator[tuple[Part, Any]]:
-        done = 0
-        for part, table in pieces:
-            repeated = np.isin(np.arange(done, done + len(table)), part.repeated)
-            table.refuse(repeated, "Expected each execution_id once, its rows together, got it in several places of the file.")
-            done += len(table)
-            yield part, self._scorer.score(table)
+    def _begun(self, pieces: Iterable[tuple[Part, ExecutionTable]]) -> Iterator[tuple[int, Callable[[], Any]]]:
+        for _, of_part in itertools.groupby(pieces, key=lambda piece: piece[0].number):
+            done = 0
+            for part, table in of_part:
+                again = np.isin(np.arange(done, done + len(table)), part.repeated)
+                table.refuse(again, "Expected each execution_id once, its rows together, got it in several places of the file.")
+                done += len(table)
+                yield part.number, self._scorer.begin(table)
 
 
 def score_here(assignment: Assignment, parts: Sequence[Part]) -> Iterator[tuple[int, bytes]]:
@@ -172,14 +174,13 @@ def _score(part: Part) -> tuple[int, bytes]:
     return next(_worker.scores([part]))
 
 
-def _ahead(items: Iterator[Item]) -> Iterator[Item]:
-    """The items, the next of which is made in another thread while one is in use."""
-    end = object()
-    with ThreadPoolExecutor(1) as reader:
-        upcoming: Future[Any] = reader.submit(next, items, end)
-        while (item := upcoming.result()) is not end:
-            upcoming = reader.submit(next, items, end)
-            yield item
+def _one_behind(items: Iterator[Item]) -> Iterator[Item]:
+    """The items, each when the next one is there."""
+    waiting: list[Item] = []
+    for item in items:
+        yield from waiting
+        waiting = [item]
+    yield from waiting
 
 
 def _payload(tables: list[Any]) -> bytes:

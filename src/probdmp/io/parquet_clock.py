@@ -39,17 +39,19 @@ def even_clocks(times: FloatArray, offsets: IntArray) -> EvenClocks:
     """
     firsts, counts = offsets[:-1], np.diff(offsets)
     with np.errstate(invalid="ignore", over="ignore"):
-        gaps = _own_gaps(times, offsets)
-        increase = np.minimum.reduceat(gaps, firsts) > 0  # NaN is not
         spans = times[offsets[1:] - 1] - times[firsts]
-        increase |= counts < 2
-        usable = increase & (counts >= 2) & np.isfinite(spans)
+        usable = (counts >= 2) & np.isfinite(spans) & (spans > 0)
         means = np.where(usable, spans / np.maximum(counts - 1, 1), np.nan)
         seconds = times[firsts + np.minimum(counts - 1, 1)]
         exact = (times[firsts] == 0) & (np.abs(means - seconds) <= EXACT * seconds)
     steps = np.where(exact, seconds, _simplest(means))
     even = _is_even(times, offsets, steps)
-    doubtful = np.flatnonzero(usable & ~even)
+    if even.all():  # and so they increase
+        return EvenClocks(steps, even, None)
+    with np.errstate(invalid="ignore", over="ignore"):
+        gaps = _own_gaps(times, offsets)
+        increase = (np.minimum.reduceat(gaps, firsts) > 0) | (counts < 2)  # NaN does not
+    doubtful = np.flatnonzero(usable & increase & ~even)
     steps[~even] = np.nan
     if not len(doubtful):
         return EvenClocks(steps, increase, None)

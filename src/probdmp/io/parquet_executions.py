@@ -16,6 +16,7 @@ from probdmp.errors import DataFileError
 from probdmp.io.parquet_arrays import codes_of, plain_names, recoded
 from probdmp.io.parquet_layout import ID, LABEL, STEP, TIME, layout_of, open_parquet
 from probdmp.io.parquet_table import ExecutionTable, joined, table_of_lists, table_of_samples
+from probdmp.io.read_ahead import read_ahead
 
 __all__ = ["Executions", "ParquetExecutions", "Span"]
 
@@ -118,7 +119,7 @@ class ParquetExecutions:
         previous: object = NONE_YET
         label = self.layout.label if labels else None
         columns = [ID, *([label] if label else [])]
-        for first, batch in self._batches(0, int(self.bounds[-1]), columns, PIECE):
+        for first, batch in read_ahead(self._batches(0, int(self.bounds[-1]), columns, PIECE)):
             begins = np.arange(len(batch)) if self.layout.is_dense else _begins(batch[ID], previous)
             previous = batch[ID][-1].as_py()
             ids.append(plain_names(batch[ID].take(pa.array(begins))))
