@@ -57,9 +57,9 @@ CAUSES = {
     ),
     "fleet": (
         "of one thread (`python benchmarks/fleet_scoring.py 60000 --profile`, on the machine above) 41 % are the windows of "
-        "the trajectory, 18 % reading, 8 % the log-likelihood, 8 % when it was most surprising, 6 % the reasons of the 3 % that "
-        "failed, the rest is in small parts; and the two cores of this virtual machine share something, most likely one core of "
-        "its host: see how much slower each is beside the other"
+        "the trajectory, 18 % reading, 8 % the log-likelihood, 8 % when it was most surprising, 6 % the reasons of the 3 % "
+        "that failed, the rest is in small parts; and the cores of this virtual machine differ by a factor of two from hour "
+        "to hour, see how fast they were"
     ),
 }
 """In words, by how the name of a row begins."""
