@@ -52,9 +52,10 @@ def repeated_ids(executions: Executions) -> BoolArray:
     """(N,) array: whether another execution has the same name."""
     import pyarrow.compute as pc
 
-    if pc.count_distinct(executions.ids, mode="all").as_py() == len(executions):
-        return np.zeros(len(executions), dtype=bool)
-    codes = executions.ids.dictionary_encode().combine_chunks().indices
+    ids, n = executions.ids, len(executions)
+    if pc.all(pc.less(ids[:-1], ids[1:]), skip_nulls=False).as_py() or pc.count_distinct(ids, mode="all").as_py() == n:
+        return np.zeros(n, dtype=bool)
+    codes = ids.dictionary_encode().combine_chunks().indices
     known = np.asarray(pc.fill_null(codes, -1).to_numpy(zero_copy_only=False))
     counts = np.bincount(known + 1)
     return np.asarray((counts[known + 1] > 1) & (known >= 0))

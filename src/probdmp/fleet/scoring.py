@@ -24,6 +24,7 @@ from probdmp.io.atomic import replacing
 from probdmp.io.container import LARGEST_MODEL
 from probdmp.io.parquet_arrays import codes_of
 from probdmp.io.parquet_layout import ID, LABEL
+from probdmp.io.read_ahead import read_ahead
 from probdmp.io.regular_file import open_regular
 
 __all__ = ["FleetSummary", "score_executions"]
@@ -140,7 +141,7 @@ def _put_together(
     metadata = {f"probdmp.{name}": value for name, value in identity.items()}
     counts: dict[str, Counter[str]] = {}
     with replacing(target) as file, pq.ParquetWriter(file, schema.with_metadata(metadata)) as writer:
-        for table in folder.tables(n_parts):
+        for table in read_ahead(folder.tables(n_parts)):
             writer.write_table(table.cast(schema).replace_schema_metadata(metadata))
             for label, verdict, count in _counted(table):
                 counts.setdefault(label, Counter())[verdict] += count

@@ -20,7 +20,7 @@ from probdmp.io.read_ahead import read_ahead
 
 __all__ = ["Executions", "ParquetExecutions", "Span"]
 
-PIECE = 2**18
+PIECE = 2**19
 """Samples that are read at a time, about: so few that their times and names stay at hand while they are looked at."""
 TABLE = 2**24
 """Numbers that were measured in the executions that are handed over together, about."""
