@@ -32,7 +32,7 @@ browser:
 test-numpy: $(VENV)/.test
 	PROBDMP_NO_EXTENSION=1 $(BIN)/python -m pytest -n auto --dist worksteal tests/gaussian tests/execution
 
-# What takes minutes; then properties once more, on eight times as many examples.
+# What takes minutes; then properties once more, on four times as many examples.
 test-slow: $(VENV)/.test
 	$(BIN)/python -m pytest -n auto --dist worksteal -m slow
 	HYPOTHESIS_PROFILE=more $(BIN)/python -m pytest -n auto --dist worksteal -m 'hypothesis and not slow'

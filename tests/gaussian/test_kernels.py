@@ -570,11 +570,8 @@ def test_points_of_paths_are_whitened_as_by_the_covariance_of_what_was_seen(case
             covariance = covariances[k][np.ix_(numbers, numbers)] + np.diag(np.tile(variances[k], n_points))
             covariance += np.kron(np.outer(aside[k, e], aside[k, e]), np.eye(dof))
             seen = ~np.isnan(residuals[k, e].ravel())
-            factor, own, heights = (
-                np.linalg.cholesky(covariance[np.ix_(seen, seen)]),
-                white[k, e].ravel(),
-                logarithms[k, e].ravel(),
-            )
+            factor = np.linalg.cholesky(covariance[np.ix_(seen, seen)])
+            own, heights = white[k, e].ravel(), logarithms[k, e].ravel()
             np.testing.assert_allclose(factor @ own[seen], residuals[k, e].ravel()[seen], rtol=0, atol=1e-11)
             np.testing.assert_allclose(heights[seen], np.log(np.diagonal(factor)), rtol=0, atol=1e-12)
             assert not own[~seen].any()

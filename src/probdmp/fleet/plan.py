@@ -11,6 +11,8 @@ __all__ = ["PART_SAMPLES", "Part", "parts_of", "repeated_ids"]
 
 PART_SAMPLES = 2**22
 """Samples of a part, about: what a run that is killed loses at most, per process."""
+NEARBY = 1 / 8
+"""Of a part: so far from where it should end, it ends with a row group instead, which is then read for one part alone."""
 
 
 class Part(NamedTuple):
@@ -35,10 +37,10 @@ def parts_of(file: ParquetExecutions, executions: Executions, samples: int = PAR
     starts, repeated = executions.starts, repeated_ids(executions)
     per_row = file.samples_per_row if file.layout.is_dense else 1.0
     rows = max(int(samples / max(per_row, 1.0)), 1)
-    # A part ends with a row group where one ends nearby, and then where the execution ends in which that row is.
-    ends = np.arange(rows, max(int(starts[-1]), 1), rows)
-    nearest = file.bounds[np.searchsorted(file.bounds, ends + rows // 8, side="right") - 1]
-    cuts = np.searchsorted(starts, np.where(np.abs(nearest - ends) <= rows // 8, nearest, ends), side="left")
+    ends, nearby = np.arange(rows, max(int(starts[-1]), 1), rows), int(rows * NEARBY)
+    last = file.bounds[np.searchsorted(file.bounds, ends + nearby, side="right") - 1]
+    # A part ends where the execution ends in which its last row is.
+    cuts = np.searchsorted(starts, np.where(np.abs(last - ends) <= nearby, last, ends), side="left")
     edges = np.unique(np.concatenate([[0], cuts, [len(executions)]]))
     parts = []
     for index, (first, last) in enumerate(zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True)):

@@ -88,7 +88,7 @@ class Scorer:
         return self.begin(table)()
 
     def begin(self, table: ExecutionTable) -> Callable[[], Any]:
-        """The same, begun: threads are at it, and what is returned waits for them."""
+        """The same, begun where there are threads for it; what is returned waits for them, or does the work."""
         owners = self._owners(table)
         self._check(table, owners)
         scores = Scores(table)
