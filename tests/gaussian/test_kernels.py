@@ -338,11 +338,24 @@ def random_floors(rng, shape, *further):
     return rng.choice([-np.inf, 0.0, 1.0, np.inf, *further], shape)
 
 
+def above_floors(found, floors, limit):
+    """What of (places, n) is above floors (n,) that rise to it from place to place up to a limit, and what they are then."""
+    left, risen = np.full_like(found, -np.inf), floors.copy()
+    for place, execution in np.ndindex(*found.shape):
+        if found[place, execution] > risen[execution]:
+            left[place, execution] = found[place, execution]
+            risen[execution] = max(risen[execution], min(found[place, execution], limit))
+    return left, risen
+
+
 @st.composite
 def windows_of_points(draw):
     """The same, where windows are points of D numbers and have as many outputs; and D."""
     values, rows, maps, which, ends, reach, wanted = draw(windows())
     d, rng = draw(st.integers(1, 3)), np.random.default_rng(draw(seeds))
+    if len(ends) < 3:
+        ends, wanted = np.array([1, 2, 3]), np.append(np.resize(wanted, 2), wanted[-1])
+        maps = np.resize(maps, (len(maps), max(maps.shape[1], 3), maps.shape[2]))
     n_outputs = maps.shape[1] * d
     n_inputs = n_outputs + draw(st.integers(0, 3))
     reach = np.maximum.accumulate(rng.integers(1, n_inputs + 1, n_outputs))
@@ -357,27 +370,30 @@ def windows_of_points(draw):
 def test_evidence_for_rest_is_a_difference_of_densities_where_it_is_above_its_floor(some, seed, most_halves, constant, std):
     arguments, d = some
     values, rows, _, which, ends, _, wanted = arguments
-    if len(ends) == 1:
-        return
     rng, first = np.random.default_rng(seed), rows.shape[1] - arguments[2].shape[1]
     scales = np.exp(0.1 * rng.normal(size=(len(which), len(ends), which.shape[1])))
-    n_halves, constants = rng.integers(1, most_halves + 1, len(ends)), constant + rng.normal(size=len(ends) - 1)
+    n_halves, constants = rng.integers(1, most_halves + 1, len(ends)), constant + rng.normal(size=len(ends) - 2)
     stds, floors = std * (1 + rng.random(d)), random_floors(rng, (len(constants), values.shape[1]), constant)
-    here, *together = mixtures_one_by_one(arguments, scales, n_halves)
-    expected = []
-    for mixed, c, floor, end in zip(together, constants, floors, ends[1:], strict=True):
-        points = values[rows[: len(mixed), first + ends[0] - d : first + end]]
-        points = points.reshape(len(mixed), 1 + (end - ends[0]) // d, d, values.shape[1])
+    limits = random_floors(rng, len(constants), constant)
+    _, here, *together = mixtures_one_by_one(arguments, scales, n_halves)
+    expected, risen = [], []
+    for mixed, c, floor, limit, end in zip(together, constants, floors, limits, ends[2:], strict=True):
+        points = values[rows[: len(mixed), first + ends[1] - d : first + end]]
+        points = points.reshape(len(mixed), 1 + (end - ends[1]) // d, d, values.shape[1])
         moved = (points[:, 1:] - points[:, :1]) / stds[:, None]
         inverse = np.linalg.inv(np.ones((moved.shape[1], moved.shape[1])) + np.eye(moved.shape[1]))
         squares = np.einsum("gpdn,pq,gqdn->gn", moved, inverse, moved)
         evidence = c - squares / 2 - mixed + here[: len(mixed)]
-        expected.append(np.where(evidence > floor, evidence, -np.inf).ravel())
+        left, raised = above_floors(evidence, floor, limit)
+        expected.append(left.ravel())
+        risen.append(raised)
     for module in {_kernels_numpy, _compiled() if kernels.COMPILED else _kernels_numpy}:
-        found, central = np.full(int(wanted[1:].sum()) * values.shape[1], -7.0), int(rng.integers(which.shape[1]))
+        found, central = np.full(int(wanted[2:].sum()) * values.shape[1], -7.0), int(rng.integers(which.shape[1]))
+        own = floors.copy()
         leave_nan_behind()
-        module.window_evidence(*arguments, scales, n_halves, stds, constants, floors, found, 4.0, central)
+        module.window_evidence(*arguments, scales, n_halves, stds, constants, own, limits, found, 4.0, central)
         np.testing.assert_allclose(found, np.concatenate(expected), rtol=1e-12, atol=1e-11)
+        np.testing.assert_allclose(own, risen, rtol=1e-12, atol=1e-11)
 
 
 @given(windows(), seeds, st.integers(1, 40), st.sampled_from([1.0, 1e6, 1e-6]))
@@ -391,15 +407,17 @@ def test_ratios_of_mixtures_are_those_of_sums_of_densities_where_they_are_above_
     other_which = rng.integers(0, len(maps), (len(which), n_others))
     scales, other_scales = (scale * np.exp(rng.normal(size=(len(which), len(ends), k))) for k in (which.shape[1], n_others))
     n_halves, floors = rng.integers(1, most_halves + 1, len(ends)), random_floors(rng, values.shape[1], -3.0)
+    limits = random_floors(rng, 1, -3.0)
     own, other = (values, rows, maps, which, ends, reach, wanted), (values, rows, others, other_which, ends, reach, wanted)
     ratios = mixtures_one_by_one(other, other_scales, n_halves)[-1] - mixtures_one_by_one(own, scales, n_halves)[-1]
-    expected = np.where(ratios > floors, ratios, -np.inf).ravel()
+    expected, risen = above_floors(ratios, floors, limits[0])
     contrary = (others, other_which, reach, other_scales)
     for module in {_kernels_numpy, _compiled() if kernels.COMPILED else _kernels_numpy}:
-        found, central = np.full(len(expected), -7.0), int(rng.integers(which.shape[1]))
+        found, central, raised = np.full(expected.size, -7.0), int(rng.integers(which.shape[1])), floors.copy()
         leave_nan_behind()
-        module.window_ratios(*own, scales, n_halves, *contrary, floors, found, 4.0, central)
-        np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-11)
+        module.window_ratios(*own, scales, n_halves, *contrary, raised, limits, found, 4.0, central)
+        np.testing.assert_allclose(found, expected.ravel(), rtol=1e-12, atol=1e-11)
+        np.testing.assert_allclose(raised, risen, rtol=1e-12, atol=1e-11)
 
 
 @given(windows(), seeds)
@@ -445,15 +463,15 @@ def test_windows_that_do_not_fit_their_maps_are_refused(position, wrong):
 @needs_extension
 @pytest.mark.parametrize("central", [-1, 1])
 def test_an_account_that_is_not_there_is_refused(central):
-    one = np.ones(2, dtype=np.int64)
-    rows, which = np.zeros((1, 2), dtype=np.int64), np.zeros((1, 1), dtype=np.int64)
-    maps, scales, stds = np.ones((1, 2, 2)), np.ones((1, 2, 1)), np.ones(1)
-    arguments = np.ones((1, 3)), rows, maps, which, np.array([1, 2]), one, one, scales, one
-    contrary, found = (maps, which, one, scales, np.zeros(3)), np.zeros(3)
-    _compiled().window_evidence(*arguments, stds, stds, np.zeros((1, 3)), found, 4.0, 0)
+    one = np.ones(3, dtype=np.int64)
+    rows, which = np.zeros((1, 3), dtype=np.int64), np.zeros((1, 1), dtype=np.int64)
+    maps, scales, stds = np.ones((1, 3, 3)), np.ones((1, 3, 1)), np.ones(1)
+    arguments = np.ones((1, 3)), rows, maps, which, np.array([1, 2, 3]), one, one, scales, one
+    contrary, found = (maps, which, one, scales, np.zeros(3), stds), np.zeros(3)
+    _compiled().window_evidence(*arguments, stds, stds, np.zeros((1, 3)), stds, found, 4.0, 0)
     _compiled().window_ratios(*arguments, *contrary, found, 4.0, 0)
     with pytest.raises(ValueError, match="one of 1 accounts"):
-        _compiled().window_evidence(*arguments, stds, stds, np.zeros((1, 3)), found, 4.0, central)
+        _compiled().window_evidence(*arguments, stds, stds, np.zeros((1, 3)), stds, found, 4.0, central)
     with pytest.raises(ValueError, match="one of 1 accounts"):
         _compiled().window_ratios(*arguments, *contrary, found, 4.0, central)
 
@@ -469,13 +487,14 @@ def test_ratios_are_written_where_they_are_wanted_and_nowhere_else():
     )
     found = np.full(9, -7.0)
     arguments = np.ones((1, 3)), rows, maps, which, ends, one, wanted, scales, one
-    _compiled().window_ratios(*arguments, maps, which, one, scales, np.full(3, -np.inf), found[:3], 4.0, 0)
+    _compiled().window_ratios(*arguments, maps, which, one, scales, np.full(3, -np.inf), np.ones(1), found[:3], 4.0, 0)
     assert np.all(found[:3] == 0)
     assert np.all(found[3:] == -7)
     nothing = np.zeros(0, dtype=np.int64)
     arguments = np.ones((1, 3)), rows, maps, which, nothing, one, nothing, np.ones((1, 0, 1)), nothing
+    nowhere = maps, which, one, np.ones((1, 0, 1)), np.zeros(3), np.ones(1), np.zeros(0)
     with pytest.raises(ValueError, match="do not belong together"):
-        _compiled().window_ratios(*arguments, maps, which, one, np.ones((1, 0, 1)), np.zeros(3), np.zeros(0), 4.0, 0)
+        _compiled().window_ratios(*arguments, *nowhere, 4.0, 0)
 
 
 @needs_extension
@@ -486,21 +505,21 @@ def test_series_of_no_degree_of_freedom_are_refused():
 
 
 @needs_extension
-@pytest.mark.parametrize("fault", ["stds", "no stds", "ends", "inputs", "constants", "floors"])
+@pytest.mark.parametrize("fault", ["stds", "no stds", "ends", "inputs", "constants", "floors", "limits"])
 def test_rest_that_does_not_belong_to_windows_is_refused(fault):
     values, maps = np.ones((5, 3)), np.ones((2, 4, 5))
     rows, which, ends, reach, wanted = (
         np.zeros((6, 5), dtype=np.int64),
         np.array([[0], [1]]),
-        np.array([2, 4]),
+        np.array([1, 2, 4]),
         *np.ones((2, 4), int),
     )
-    wanted, stds, constants, floors = wanted[:2], np.ones(2), np.ones(1), np.zeros((1, 3))
+    wanted, stds, constants, floors, limits = wanted[:3], np.ones(2), np.ones(1), np.zeros((1, 3)), np.ones(1)
 
     def weigh():
-        scales, n_halves = np.ones((2, 2, 1)), np.ones(2, dtype=np.int64)
+        scales, n_halves = np.ones((2, 3, 1)), np.ones(3, dtype=np.int64)
         arguments = values, rows, maps, which, ends, reach, wanted, scales, n_halves
-        _compiled().window_evidence(*arguments, stds, constants, floors, np.empty(3), 4.0, 0)
+        _compiled().window_evidence(*arguments, stds, constants, floors, limits, np.empty(3), 4.0, 0)
 
     weigh()
     match fault:
@@ -509,14 +528,16 @@ def test_rest_that_does_not_belong_to_windows_is_refused(fault):
         case "no stds":
             stds = np.ones(0)
         case "ends":
-            ends = np.array([2, 3])
+            ends = np.array([1, 2, 3])
         case "inputs":
             rows, maps = rows[:, :3].copy(), maps[..., :3].copy()
         case "constants":
             constants = np.ones(2)
         case "floors":
             floors = np.zeros((1, 2))
-    with pytest.raises(ValueError, match=r"stds|constants|floors"):
+        case "limits":
+            limits = np.ones(2)
+    with pytest.raises(ValueError, match=r"stds|constants|floors|limits"):
         weigh()
 
 
@@ -654,7 +675,7 @@ def test_logarithms_of_mixtures_are_those_of_the_library(square):
         arguments = values, zero, np.zeros((1, 1, 1)), zero, one, one, one, np.ones((1, 1, 1)), 2 * one
         everything = np.full(11, -np.inf)
         contrary = np.ones((1, 1, 1)), zero, one, np.full((1, 1, 1), scale)
-        _compiled().window_ratios(*arguments, *contrary, everything, found, 4.0, 0)
+        _compiled().window_ratios(*arguments, *contrary, everything, everything[:1], found, 4.0, 0)
         expected = -np.log(scale + scale / 4 * np.sqrt(square) ** 2)
         np.testing.assert_allclose(found, expected, rtol=1e-15, atol=1e-15)
 

@@ -18,7 +18,7 @@ from probdmp.checks import FloatArray, IntArray
 from probdmp.detection.path_model import PathModel
 from probdmp.detection.phase_clock import TICKS
 from probdmp.detection.trajectory_statistics import SHIFT_STD
-from probdmp.detection.window_maps import Densities, Rest, WindowInputs, WindowMaps
+from probdmp.detection.window_maps import Densities, Needed, Rest, WindowInputs, WindowMaps
 from probdmp.detection.windows import PathWindows, inverse_of_cholesky
 
 __all__ = ["DEGREES_OF_FREEDOM", "EVIDENCE", "Evidence", "Foreseen", "Pace", "Standstill"]
@@ -32,6 +32,8 @@ LAST_STANDSTILL = 92
 """After this tick the movement may be coming to its end, and standing still is no evidence."""
 SLOWED = 0.5
 """Speed of what is called slow."""
+FIRST_BEFORE = 4
+"""Points before after which it mostly is plain how unlikely they are altogether."""
 FIRST_AHEAD = 3
 """Points ahead after which it mostly is plain that an execution has not slowed down."""
 
@@ -65,37 +67,38 @@ class Foreseen:
         self._bases = np.exp(scales / (-(DEGREES_OF_FREEDOM + counts) / 2))
 
     def evidence(
-        self, inputs: WindowInputs, offsets: IntArray, points: IntArray, wanted: IntArray, rest: Rest, floors: FloatArray
+        self, inputs: WindowInputs, offsets: IntArray, points: IntArray, wanted: IntArray, rest: Rest, needed: Needed
     ) -> list[FloatArray]:
-        """Nats that speak for rest since the first of the points, of executions side by side.
+        """Nats that speak for rest since the second of the points, of executions side by side.
 
         Parameters
         ----------
         inputs : of which nothing is unseen.
         offsets : (P) ticks at which the points of windows are seen, relative to the place.
-        points, wanted : (J) of so many points, increasing, at so many places, the first ones, not increasing.
-        floors : (J - 1, n) up to which they need not be known; -infinity then.
+        points, wanted : (J) of so many points, increasing, at so many places, the first ones, not increasing; after the first
+            it may be plain that there is nothing.
+        needed : of J - 2 channels.
 
         Returns
         -------
-        J - 1 arrays (wanted, n).
+        J - 2 arrays (wanted, n).
         """
         numbers, ends = np.repeat(offsets, self._dof), points * self._dof
-        return self._windows.maps.evidence(inputs, numbers, ends, wanted, self._densities(points), rest, floors)
+        return self._windows.maps.evidence(inputs, numbers, ends, wanted, self._densities(points), rest, needed)
 
     def ratios(
-        self, inputs: WindowInputs, offsets: IntArray, points: IntArray, wanted: int, other: "Foreseen", floors: FloatArray
+        self, inputs: WindowInputs, offsets: IntArray, points: IntArray, wanted: int, other: "Foreseen", needed: Needed
     ) -> FloatArray:
         """Nats that speak for what another foresees of the last of the points, (wanted, n) array.
 
         Parameters
         ----------
         points : (J) increasing: after each of the others it may be plain that there is nothing.
-        floors : (n,) up to which they need not be known; -infinity then.
+        needed : of one channel.
         """
         numbers, ends = np.repeat(offsets, self._dof), points * self._dof
         contrary, central = (other._windows.maps, other._densities(points)), central_of(self._windows.shifts)
-        return self._windows.maps.ratios(inputs, numbers, ends, wanted, self._densities(points), contrary, floors, central)
+        return self._windows.maps.ratios(inputs, numbers, ends, wanted, self._densities(points), contrary, needed, central)
 
     def _densities(self, points: IntArray) -> Densities:
         bases = np.ascontiguousarray(self._bases[..., points - 1].swapaxes(1, 2))
@@ -194,18 +197,19 @@ class Standstill:
         self._constants = np.array([self._rest_constants(int(points)) for points in self._points_at])
         self._rest = Rest(self._rest_stds, self._constants, central_of(self.shifts))
 
-    def weigh(self, inputs: WindowInputs, wanted: IntArray, floors: FloatArray) -> list[FloatArray]:
+    def weigh(self, inputs: WindowInputs, wanted: IntArray, needed: Needed) -> list[FloatArray]:
         """The same for each horizon at so many places, the first ones: J arrays (wanted, n).
 
         Parameters
         ----------
         inputs : of which nothing is unseen.
-        floors : (J, n) nats up to which it need not be known; it is -infinity then.
+        needed : of the J channels.
         """
         before = len(self.before)
-        points = np.array([before, *(before + self._points_at)])
+        points = np.array([FIRST_BEFORE, before, *(before + self._points_at)])
         offsets = np.concatenate([-self.before, self.ahead])
-        return self._going_on.evidence(inputs, offsets, points, np.array([wanted[0], *wanted]), self._rest, floors)
+        places = np.array([wanted[0], wanted[0], *wanted])
+        return self._going_on.evidence(inputs, offsets, points, places, self._rest, needed)
 
     @cached_property
     def _looks(self) -> Looks:
@@ -288,13 +292,13 @@ class Pace:
             for ahead in (self.ahead, np.rint(SLOWED * self.ahead).astype(int))
         )
 
-    def weigh(self, inputs: WindowInputs, wanted: IntArray, floors: FloatArray) -> list[FloatArray]:
+    def weigh(self, inputs: WindowInputs, wanted: IntArray, needed: Needed) -> list[FloatArray]:
         """The same for each horizon at so many places, the first ones: J arrays (wanted, n); arguments as for `Standstill`."""
         offsets, before = np.concatenate([-self.before, self.ahead]), len(self.before)
         points = [before + np.array([FIRST_AHEAD, np.searchsorted(self.ahead, h, "right")]) for h in self.horizons]
         return [
-            self._going_on.ratios(inputs, offsets, own, int(count), self._slowed, floor)
-            for own, count, floor in zip(points, wanted, floors, strict=True)
+            self._going_on.ratios(inputs, offsets, own, int(count), self._slowed, needed.of([j]))
+            for j, (own, count) in enumerate(zip(points, wanted, strict=True))
         ]
 
     @cached_property

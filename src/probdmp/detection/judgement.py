@@ -15,12 +15,13 @@ from probdmp.checks import BoolArray, FloatArray, IntArray
 from probdmp.detection.calibrated_monitor import LOOKED_AT_AGAIN
 from probdmp.detection.calibration import Calibration
 from probdmp.detection.expectation import Expectation
-from probdmp.detection.movement_channels import as_evidence, as_values
+from probdmp.detection.movement_channels import as_evidence, as_value, as_values
 from probdmp.detection.reasons import LOOKED_BACK, REMEMBERED, better_fits, reasons_for, signal_shares
 from probdmp.detection.recorded_sensors import NEVER
 from probdmp.detection.recorded_ticks import RecordedTicks
 from probdmp.detection.sensor_watch import CAUSES
 from probdmp.detection.verdict import Verdict
+from probdmp.detection.window_maps import Needed
 from probdmp.dmp.phase import phases_at
 
 __all__ = ["Standard", "Verdicts", "joined", "judge_recorded"]
@@ -95,8 +96,8 @@ def judge_recorded(
     durations, dts : (N,) arrays, seconds.
     """
     paths, sensors, n = recorded.paths, recorded.sensors, len(recorded.paths)
-    floors = partial(_needed, standard)
-    evidence = expectation.trajectory.evidence(paths.transpose(1, 2, 0), recorded.counts, recorded.goals, floors)
+    needed = partial(_needed, standard)
+    evidence = expectation.trajectory.evidence(paths.transpose(1, 2, 0), recorded.counts, recorded.goals, needed)
     moments = _moments(standard, evidence)
     rows, at = np.arange(n), np.maximum(moments.ticks, 0)
     alarmed_at = np.where(moments.is_alarm, recorded.steps[rows, at], NEVER)
@@ -125,14 +126,20 @@ def judge_recorded(
     )
 
 
-def _needed(standard: Standard, highest: FloatArray) -> FloatArray:
-    """What evidence (C, N) has to be above to be as surprising as the highest so far, or to raise an alarm."""
+def _needed(standard: Standard, highest: FloatArray) -> Needed:
+    """Evidence (C, N) that is as surprising as the highest so far, and all that may raise an alarm."""
     calibration = standard.calibration
     known, values = np.flatnonzero(~np.isnan(highest).all(axis=1)).tolist(), as_values(highest)
     nothing = np.zeros(highest.shape[1])
     reached = np.max([nothing, *(calibration.surprise_of(channel, values[channel]) for channel in known)], axis=0)
-    least = as_evidence(calibration.least_values(np.minimum(reached, standard.threshold)).T)
-    return np.nextafter(least, -np.inf)
+    surprises = np.append(np.minimum(reached, standard.threshold), standard.threshold)
+    least = np.nextafter(_least(calibration, surprises), -np.inf)
+    return Needed(least[:, :-1], least[:, -1])
+
+
+def _least(calibration: Calibration, surprises: FloatArray) -> FloatArray:
+    """(C, n) array: evidence below which no channel is as surprising as given (n,), safely rounded down."""
+    return as_evidence(calibration.least_values(surprises).T)
 
 
 def _moments(standard: Standard, evidence: FloatArray) -> _Moments:
@@ -143,26 +150,30 @@ def _moments(standard: Standard, evidence: FloatArray) -> _Moments:
     nothing = np.zeros(n, dtype=np.int64)
     moments = _Moments(nothing, nothing.copy(), largest / standard.threshold, np.zeros(n, dtype=np.bool_))
     suspects = np.flatnonzero(moments.ratios > 1)
-    least = as_evidence(np.where(largest > 0, calibration.least_values(largest).T, np.inf))
+    least = np.where(largest > 0, _least(calibration, largest), np.inf)
     least[:, suspects] = np.inf
     first = np.full(n, NEVER)  # by tick, then by channel
     for channel in range(n_channels):
         chosen = np.flatnonzero(highest[channel] >= least[channel])
         ticks, places = np.nonzero(evidence[channel][:, chosen] >= least[channel, chosen])
         k = chosen[places]
-        surprises = calibration.surprise_of(channel, as_values(evidence[:, ticks, k])[channel])
+        surprises = calibration.surprise_of(channel, as_value(channel, evidence[channel, ticks, k]))
         is_largest = surprises >= largest[k] * (1 - TIE)
         np.minimum.at(first, k[is_largest], ticks[is_largest] * n_channels + channel)
     moments.ticks[:] = np.where(first < NEVER, first // n_channels, -1)
     moments.channels[:] = np.where(first < NEVER, first % n_channels, 0)
-    for of_all, some in zip(moments, _alarms(standard, as_values(evidence[:, :, suspects])), strict=True):
+    for of_all, some in zip(moments, _alarms(standard, evidence[:, :, suspects]), strict=True):
         of_all[suspects] = some
     return moments
 
 
-def _alarms(standard: Standard, values: FloatArray) -> _Moments:
-    """The same of executions that are above the threshold at some tick, every tick looked at."""
-    surprises = standard.calibration.surprise(values.transpose(2, 1, 0))
+def _alarms(standard: Standard, evidence: FloatArray) -> _Moments:
+    """The same of n executions that are above the threshold at some tick, every tick looked at that may be; of (C, T, n)."""
+    calibration, (n_channels, n_ticks, n) = standard.calibration, evidence.shape
+    surprises, least = np.zeros((n, n_ticks, n_channels)), _least(calibration, np.array([standard.threshold]))
+    for channel, alarming in enumerate(evidence >= least[:, None]):
+        at = np.nonzero(alarming)
+        surprises[at[1], at[0], channel] = calibration.surprise_of(channel, as_value(channel, evidence[channel][at]))
     ratios = surprises.max(axis=-1) / standard.threshold
     ticks, rows = np.arange(ratios.shape[1]), np.arange(len(ratios))
     below = np.maximum.accumulate(np.where(ratios > 1, -1, ticks), axis=1)  # the last tick that was not above

@@ -16,6 +16,7 @@ __all__ = [
     "Horizon",
     "as_evidence",
     "as_suspicion",
+    "as_value",
     "as_values",
     "channels_for",
 ]
@@ -75,6 +76,11 @@ def as_values(evidence: FloatArray) -> FloatArray:
     values = np.array(evidence)
     values[WEIGHED] = as_suspicion(evidence[WEIGHED])
     return values
+
+
+def as_value(channel: int, evidence: FloatArray) -> FloatArray:
+    """The same of one channel, (…)."""
+    return as_suspicion(evidence) if WEIGHED.start <= channel < WEIGHED.stop else evidence
 
 
 def as_evidence(values: FloatArray) -> FloatArray:

@@ -24,8 +24,8 @@ from probdmp.detection.movement_channels import (
 )
 from probdmp.detection.path_model import PathModel
 from probdmp.detection.trajectory_follower import Gathering, Statistics, TrajectoryFollower
-from probdmp.detection.trajectory_statistics import Displacement, Position, relative_over_time
-from probdmp.detection.window_maps import WindowInputs
+from probdmp.detection.trajectory_statistics import Displacement, Position, make_relative
+from probdmp.detection.window_maps import Needed, WindowInputs
 from probdmp.detection.windows import gather
 
 __all__ = [
@@ -46,8 +46,8 @@ SIDE_BY_SIDE = 520
 a power of two, or the numbers of one window would all compete for the same few places of the cache."""
 
 
-Floors = Callable[[FloatArray], FloatArray]
-"""From the highest evidence of each channel so far, (C, n), NaN where it is not known, to what has to be exceeded, (C, n)."""
+WhatMatters = Callable[[FloatArray], Needed]
+"""Given the highest evidence of each channel so far, (C, n), NaN where it is not known."""
 
 
 class Judge(Protocol):
@@ -99,22 +99,22 @@ class TrajectoryModel:
         counts = np.full(len(paths), paths.shape[1])
         return as_values(self.evidence(paths.transpose(1, 2, 0), counts, goals, all_of_it)).transpose(2, 1, 0)
 
-    def evidence(self, paths: FloatArray, counts: IntArray, goals: FloatArray, floors: Floors) -> FloatArray:
+    def evidence(self, paths: FloatArray, counts: IntArray, goals: FloatArray, needed: WhatMatters) -> FloatArray:
         """The same before `as_values`, with executions innermost: from paths (T, S, n) to (C, T, n).
 
         Parameters
         ----------
         counts : (n,) array: ticks of each execution; there is no evidence after them.
-        floors : what evidence that weighs two accounts has to be above to matter; what is not may be -infinity.
+        needed : of what weighs two accounts.
         """
         n = paths.shape[-1]
         evidence = np.empty((len(MOVEMENT_CHANNELS) + len(self.feel), len(paths), n))
         edges = np.linspace(0, n, max(round(n / SIDE_BY_SIDE), 1) + 1).astype(int).tolist()
         for part in starmap(slice, pairwise(edges)):
-            self._weigh(paths[..., part], counts[part], goals[part], floors, evidence[..., part])
+            self._weigh(paths[..., part], counts[part], goals[part], needed, evidence[..., part])
         return evidence
 
-    def _weigh(self, paths: FloatArray, counts: IntArray, goals: FloatArray, floors: Floors, values: FloatArray) -> None:
+    def _weigh(self, paths: FloatArray, counts: IntArray, goals: FloatArray, needed: WhatMatters, values: FloatArray) -> None:
         """The same of some of them, into values (C, T, n)."""
         unseen, length = np.asarray(np.isnan(paths)), len(paths)
         is_lossy, is_over = unseen.any(), np.arange(length)[:, None] >= counts
@@ -124,15 +124,15 @@ class TrajectoryModel:
             values[channel] = statistic.weigh(inputs, length)
         if means is not None:
             self._judge_again(values, paths, unseen, means)
-        values[1] = relative_over_time(values[1])
+        make_relative(values[1])
         highest = np.full((len(values), len(counts)), np.nan)
         for channel, _ in self._plain:
             values[channel, is_over] = np.nan
             highest[channel] = np.fmax.reduce(values[channel], initial=np.nan)
-        least = floors(highest)
+        least = needed(highest)
         for evidence, horizons in self._questions:
             wanted = np.maximum(min(length, evidence.last + 1) - np.array(evidence.horizons), 0)
-            own = np.ascontiguousarray(least[[horizon.channel for horizon in horizons]])
+            own = least.of([horizon.channel for horizon in horizons])
             nothing = [np.empty((0, len(counts)))] * len(horizons)
             for horizon, found in zip(horizons, evidence.weigh(inputs, wanted, own) if wanted[0] else nothing, strict=True):
                 weighed, until = values[horizon.channel], horizon.ticks + len(found)
@@ -184,9 +184,9 @@ class TrajectoryModel:
         return statistics, Gathering(statistics, self._n_dof, self._whole.means.shape[1])
 
 
-def all_of_it(highest: FloatArray) -> FloatArray:
-    """Floors of evidence of which all is wanted."""
-    return np.full_like(highest, -np.inf)
+def all_of_it(highest: FloatArray) -> Needed:
+    """All evidence matters."""
+    return Needed(np.full_like(highest, -np.inf), np.full(len(highest), -np.inf))
 
 
 def _places(lost: BoolArray, offsets: IntArray, count: int) -> IntArray:

@@ -21,7 +21,7 @@ __all__ = [
     "SLOPPINESS_DELAY",
     "Displacement",
     "Position",
-    "relative_over_time",
+    "make_relative",
     "sloppiness",
 ]
 
@@ -105,14 +105,13 @@ def sloppiness(total: FloatArray | float, count: FloatArray | float) -> FloatArr
     return np.asarray((ORDINARY_TICKS * ORDINARY_SQUARE + total) / (ORDINARY_TICKS + count) / ORDINARY_SQUARE)
 
 
-def relative_over_time(squares: FloatArray) -> FloatArray:
-    """Squared displacements (T, n) relative to those that the same execution had shown before the window."""
+def make_relative(squares: FloatArray) -> None:
+    """Divide squared displacements (T, n) by those that the same execution had shown before the window."""
     before = squares[:-SLOPPINESS_DELAY]
     unseen = np.isnan(before)
     if unseen.any():
         totals, counts = np.cumsum(np.where(unseen, 0.0, before), axis=0), np.cumsum(~unseen, axis=0)
     else:
         totals, counts = np.cumsum(before, axis=0), np.arange(1, len(before) + 1)[:, None]
-    relative = squares / sloppiness(0.0, 0.0)
-    relative[SLOPPINESS_DELAY:] = squares[SLOPPINESS_DELAY:] / sloppiness(totals, counts)
-    return relative
+    squares[:SLOPPINESS_DELAY] /= sloppiness(0.0, 0.0)
+    squares[SLOPPINESS_DELAY:] /= sloppiness(totals, counts)

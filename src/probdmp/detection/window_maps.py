@@ -4,6 +4,7 @@ What is compared with the model is z = L^-1 (window - mean - gain ahead), where 
 That is linear in (1, ahead, window), so one matrix for each place holds all of it, for all shifts of tempo together.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -12,7 +13,7 @@ import numpy as np
 from probdmp.checks import FloatArray, IntArray
 from probdmp.gaussian import kernels
 
-__all__ = ["Densities", "Rest", "WindowInputs", "WindowMaps", "linear_maps"]
+__all__ = ["Densities", "Needed", "Rest", "WindowInputs", "WindowMaps", "linear_maps"]
 
 
 class WindowInputs(NamedTuple):
@@ -97,25 +98,26 @@ class WindowMaps:
         wanted: IntArray,
         densities: "Densities",
         rest: "Rest",
-        floors: FloatArray,
+        needed: "Needed",
     ) -> list[FloatArray]:
-        """Nats that speak for rest since the first end; arguments as for `squares`.
+        """Nats that speak for rest since the second end; arguments as for `squares`.
 
         Parameters
         ----------
+        ends : (J) the first of them is where it may become plain that there is nothing.
         densities : of the squares up to each end, mixed over shifts.
-        floors : (J - 1, n) up to which it need not be known; it is -infinity then.
+        needed : of J - 2 channels.
 
         Returns
         -------
-        J - 1 arrays (wanted, n).
+        J - 2 arrays (wanted, n).
         """
         stds, constants, central = rest
-        found = np.empty(int(wanted[1:].sum()) * inputs.values.shape[1])
+        found = np.empty(int(wanted[2:].sum()) * inputs.values.shape[1])
         bases, n_halves, freedom = densities
         asked = self._asked(inputs, offsets, ends, wanted)
-        kernels.window_evidence(*asked, bases, n_halves, stds, constants, floors, found, freedom, central)
-        return kernels.split_sums(found, wanted[1:], inputs.values.shape[1])
+        kernels.window_evidence(*asked, bases, n_halves, stds, constants, *needed, found, freedom, central)
+        return kernels.split_sums(found, wanted[2:], inputs.values.shape[1])
 
     def ratios(
         self,
@@ -125,7 +127,7 @@ class WindowMaps:
         wanted: int,
         densities: "Densities",
         other: tuple["WindowMaps", "Densities"],
-        floors: FloatArray,
+        needed: "Needed",
         central: int,
     ) -> FloatArray:
         """Nats that speak for other windows; arguments as above.
@@ -133,7 +135,7 @@ class WindowMaps:
         Parameters
         ----------
         ends : (J) the last of them is asked about; the others are where it may become plain that there is nothing.
-        floors : (n,) array: up to which it need not be known.
+        needed : of one channel.
         central : the account that is likeliest beforehand.
 
         Returns
@@ -144,7 +146,8 @@ class WindowMaps:
         found, n = np.empty((wanted, inputs.values.shape[1])), np.full(len(ends), wanted)
         asked = self._asked(inputs, offsets, ends, n)
         contrary = (maps.maps, maps.which, maps.reach, other_bases)
-        kernels.window_ratios(*asked, bases, n_halves, *contrary, floors, found.reshape(-1), freedom, central)
+        floors, limits = needed
+        kernels.window_ratios(*asked, bases, n_halves, *contrary, floors[0], limits, found.reshape(-1), freedom, central)
         return found
 
     def _squares(
@@ -160,6 +163,19 @@ class WindowMaps:
     ) -> tuple[FloatArray | IntArray, ...]:
         rows = inputs.rows(int(wanted[0]), offsets, self.signals)
         return inputs.values, rows, self.maps, self.which, ends, self.reach, wanted
+
+
+class Needed(NamedTuple):
+    """What evidence has to be above to matter, of C channels; what does not may be -infinity."""
+
+    floors: FloatArray
+    """(C, n) array; while evidence is weighed they rise to what was found."""
+    limits: FloatArray
+    """(C,) array: up to which they rise; whatever is above that matters."""
+
+    def of(self, channels: Sequence[int]) -> "Needed":
+        """The same of some channels, in memory of its own."""
+        return Needed(self.floors[channels], self.limits[channels])
 
 
 class Densities(NamedTuple):

@@ -31,6 +31,8 @@
 
 #define MOST_STATES 4
 #define OUTPUTS 4 /* rows of maps that are multiplied with a window at once */
+#define BEFORE 1 /* the sum over all that came before a place; the one before it is over the beginning of that */
+#define AHEAD 2 /* the first of the sums over what follows too */
 #define ROWS 4 /* of a covariance that are changed, or factorised, at once */
 #define TILE 64 /* observations of each that are brought side by side at a time */
 #define LARGEST_MAGNITUDE 1e100 /* see checks.py */
@@ -184,7 +186,8 @@ typedef struct {
     Py_ssize_t n_dof;
     const double *stds, *constants; /* of rest */
     const Windows *windows;
-    const double *floors;
+    double *floors;       /* up to which it need not be known; they rise to what is found, up to a limit */
+    const double *limits;
 } Contrary;
 
 /* Outputs of maps of one window, under some accounts of it. */
@@ -234,7 +237,7 @@ typedef struct {
 #define quotient NAMED(quotient)
 #define plus_product NAMED(plus_product)
 #define where_seen NAMED(where_seen)
-#define where_above NAMED(where_above)
+#define take_above NAMED(take_above)
 #define step_lane NAMED(step_lane)
 #define store NAMED(store)
 #define everywhere NAMED(everywhere)
@@ -273,6 +276,7 @@ typedef struct {
 #define square_next NAMED(square_next)
 #define mapped_at NAMED(mapped_at)
 #define at_rest NAMED(at_rest)
+#define last_above NAMED(last_above)
 #define weigh_rest NAMED(weigh_rest)
 #define weigh_windows NAMED(weigh_windows)
 #define pack_place NAMED(pack_place)
@@ -722,11 +726,11 @@ static int has_account(const Windows *s, Py_ssize_t central)
     return 0;
 }
 
-/* Whether what follows the first end are further points of as many degrees of freedom as the place before it has. */
+/* Whether what follows what came BEFORE are further points of as many degrees of freedom as the place before them has. */
 static int points_fit(const Windows *s, Py_ssize_t d)
 {
-    int is_sound = d > 0 && s->ends[0] >= d && s->n_inputs >= s->n_outputs;
-    for (Py_ssize_t j = 1; is_sound && j < s->n_sums; j++) is_sound = (s->ends[j] - s->ends[0]) % d == 0;
+    int is_sound = d > 0 && s->ends[BEFORE] >= d && s->n_inputs >= s->n_outputs;
+    for (Py_ssize_t j = AHEAD; is_sound && j < s->n_sums; j++) is_sound = (s->ends[j] - s->ends[BEFORE]) % d == 0;
     if (!is_sound) PyErr_SetString(PyExc_ValueError, "ends, maps and stds do not belong together");
     return is_sound;
 }
@@ -751,18 +755,20 @@ static int weigh(Windows *s, Windows *other, Contrary *contrary, double *found)
 static PyObject *window_evidence(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
 {
     static const Spec specs[] = {WINDOWS, {"scales", 0, 3, 0}, {"n_halves", 0, 1, 1}, {"stds", 0, 1, 0}, {"constants", 0, 1, 0},
-                                 {"floors", 0, 2, 0}, {"found", 1, 1, 0}};
+                                 {"floors", 1, 2, 0}, {"limits", 0, 1, 0}, {"found", 1, 1, 0}};
     enum { COUNT = sizeof(specs) / sizeof(specs[0]) };
     Array x[COUNT];
     Windows s;
     double freedom;
     Py_ssize_t central;
     if (two_numbers(arguments, given, COUNT, &freedom, &central) < 0 || take(arguments, COUNT, specs, COUNT, x) < 0) return NULL;
-    int done = windows_fit(x, x[COUNT - 1].view.shape[0], 1, &s) && mixtures_fit(&x[7], &x[8], freedom, &s)
+    int done = windows_fit(x, x[COUNT - 1].view.shape[0], AHEAD, &s) && mixtures_fit(&x[7], &x[8], freedom, &s)
                && has_account(&s, central) && points_fit(&s, x[9].view.shape[0])
-               && agree(&x[10], "constants", s.n_sums - 1, 0, 0, 0) && agree(&x[11], "floors", s.n_sums - 1, s.n, 0, 0);
+               && agree(&x[10], "constants", s.n_sums - AHEAD, 0, 0, 0) && agree(&x[11], "floors", s.n_sums - AHEAD, s.n, 0, 0)
+               && agree(&x[12], "limits", s.n_sums - AHEAD, 0, 0, 0);
     if (done) {
-        Contrary rest = {.n_dof = x[9].view.shape[0], .stds = x[9].data, .constants = x[10].data, .floors = x[11].data};
+        Contrary rest = {.n_dof = x[9].view.shape[0], .stds = x[9].data, .constants = x[10].data, .floors = x[11].data,
+                         .limits = x[12].data};
         s.central = central;
         done = weigh(&s, NULL, &rest, x[COUNT - 1].data);
     }
@@ -774,7 +780,8 @@ static PyObject *window_evidence(PyObject *module, PyObject *const *arguments, P
 static PyObject *window_ratios(PyObject *module, PyObject *const *arguments, Py_ssize_t given)
 {
     static const Spec specs[] = {WINDOWS, {"scales", 0, 3, 0}, {"n_halves", 0, 1, 1}, {"other_maps", 0, 3, 0}, {"other_which", 0, 2, 1},
-                                 {"other_reach", 0, 1, 1}, {"other_scales", 0, 3, 0}, {"floors", 0, 1, 0}, {"found", 1, 1, 0}};
+                                 {"other_reach", 0, 1, 1}, {"other_scales", 0, 3, 0}, {"floors", 1, 1, 0}, {"limits", 0, 1, 0},
+                                 {"found", 1, 1, 0}};
     enum { COUNT = sizeof(specs) / sizeof(specs[0]) };
     Array x[COUNT];
     Windows s, other;
@@ -785,9 +792,9 @@ static PyObject *window_ratios(PyObject *module, PyObject *const *arguments, Py_
     const Py_ssize_t size = x[COUNT - 1].view.shape[0];
     int done = windows_fit(x, size, x[4].view.shape[0] - 1, &s) && windows_fit(others, size, x[4].view.shape[0] - 1, &other)
                && mixtures_fit(&x[7], &x[8], freedom, &s) && mixtures_fit(&x[12], &x[8], freedom, &other)
-               && has_account(&s, central) && agree(&x[13], "floors", s.n, 0, 0, 0);
+               && has_account(&s, central) && agree(&x[13], "floors", s.n, 0, 0, 0) && agree(&x[14], "limits", 1, 0, 0, 0);
     if (done) {
-        Contrary windows = {.floors = x[13].data};
+        Contrary windows = {.floors = x[13].data, .limits = x[14].data};
         s.central = central;
         done = weigh(&s, &other, &windows, x[COUNT - 1].data);
     }
@@ -1234,12 +1241,16 @@ INLINE Lane where_seen(Lane x, Lane e)
 }
 
 /* x, but -infinity where it is not above a number */
-INLINE Lane where_above(Lane x, Lane floor)
+/* What is above its floor, which rises to it up to a limit, and -infinity elsewhere. */
+INLINE Lane take_above(Lane x, double *floors, double limit, Py_ssize_t width)
 {
-    double numbers[WIDTH], floors[WIDTH];
+    double numbers[WIDTH];
     store(numbers, x);
-    store(floors, floor);
-    for (int w = 0; w < WIDTH; w++) numbers[w] = numbers[w] > floors[w] ? numbers[w] : -INFINITY;
+    for (Py_ssize_t w = 0; w < width; w++) {
+        const double rise = numbers[w] < limit ? numbers[w] : limit;
+        if (!(numbers[w] > floors[w])) numbers[w] = -INFINITY;
+        else if (rise > floors[w]) floors[w] = rise;
+    }
     return load(numbers);
 }
 
@@ -1727,8 +1738,8 @@ INLINE void look_at_lane(const Windows *s, Py_ssize_t place, Py_ssize_t first, P
    `square` are those up to the end before. */
 INLINE Lane at_rest(const Windows *s, const Contrary *c, Py_ssize_t j, double *totals, Lane *square)
 {
-    const Py_ssize_t d = c->n_dof, first = s->n_inputs - s->n_outputs, n_points = (s->ends[j] - s->ends[0]) / d;
-    const double *place = s->window + (first + s->ends[0] - d) * WIDTH;
+    const Py_ssize_t d = c->n_dof, first = s->n_inputs - s->n_outputs, n_points = (s->ends[j] - s->ends[BEFORE]) / d;
+    const double *place = s->window + (first + s->ends[BEFORE] - d) * WIDTH;
     for (Py_ssize_t i = first + s->ends[j - 1]; i < first + s->ends[j]; i += d)
         for (Py_ssize_t k = 0; k < d; k++) {
             const Lane moved = times(1 / c->stds[k], plus(load(s->window + (i + k) * WIDTH), -1.0, load(place + k * WIDTH)));
@@ -1738,49 +1749,62 @@ INLINE Lane at_rest(const Windows *s, const Contrary *c, Py_ssize_t j, double *t
     Lane distance = *square;
     for (Py_ssize_t k = 0; k < d; k++)
         distance = plus_product(distance, times(-1.0 / (n_points + 1), load(totals + k * WIDTH)), load(totals + k * WIDTH));
-    return plus_number(times(-0.5, distance), c->constants[j - 1]);
+    return plus_number(times(-0.5, distance), c->constants[j - AHEAD]);
+}
+
+/* The last of the sums before an end of which, with what came before, there may be more than a floor; BEFORE if there is none. */
+INLINE Py_ssize_t last_above(const Lane before, const double *most, const double *floors, Py_ssize_t n, Py_ssize_t width,
+                             Py_ssize_t end)
+{
+    while (--end > BEFORE)
+        if (any_above(plus(before, 1.0, load(most + end * WIDTH)), some_of(floors + (end - AHEAD) * n, width))) break;
+    return end;
 }
 
 /* Evidence for rest at one place of some executions, where it is above its floor. What all accounts say of it is at least what one
-   of them says, and of what came before at most `before`, so most of them need not be asked: at most places there is none. */
+   of them says, and of what came before at most `before`, or what its beginning lets them say, so most of them need not be asked:
+   at most places there is none. */
 INLINE void weigh_rest(const Windows *s, const Contrary *c, Lane before, Py_ssize_t place, Py_ssize_t first, Py_ssize_t width,
                        double *found)
 {
     const Py_ssize_t a = s->n_accounts, n = s->n, mapped = mapped_at(s, place);
-    const double *scales = s->scales + mapped * s->n_sums * a, *floors = c->floors + first, *packed = s->own;
+    const double *scales = s->scales + mapped * s->n_sums * a, *packed = s->own;
     const int64_t *extents = s->own_extents;
     double *totals = s->more, *others = totals + c->n_dof * WIDTH, *most = others + s->n_sums * WIDTH, own[WIDTH] = {0};
+    double *floors = c->floors + first, *central = s->sums + s->central * WIDTH;
     const Lane zero = everywhere(0.0), nothing = everywhere(-INFINITY);
     Lane square = zero;
-    Py_ssize_t n_ends = 1, n_asked = 0;
+    Py_ssize_t n_ends = AHEAD;
     gather(s, place, first, width);
     memset(totals, 0, c->n_dof * WIDTH * sizeof(double));
-    packed = square_next(s, 0, packed, &extents, 1, own);
-    for (Py_ssize_t j = 1; j < s->n_sums && place < s->wanted[j]; j++, n_ends++) {
-        const Lane other = at_rest(s, c, j, totals, &square);
-        packed = square_next(s, j, packed, &extents, 1, own);
-        store(others + j * WIDTH, other);
-        store(most + j * WIDTH, plus(other, -1.0, log_density(s, scales[j * a + s->central], load(own), s->n_halves[j])));
-        if (any_above(plus(before, 1.0, load(most + j * WIDTH)), some_of(floors + (j - 1) * n, width))) n_asked = j;
+    for (Py_ssize_t j = 0; j < AHEAD; j++) packed = square_next(s, j, packed, &extents, 1, own);
+    const Lane here = load(own);
+    for (; n_ends < s->n_sums && place < s->wanted[n_ends]; n_ends++) {
+        const Lane other = at_rest(s, c, n_ends, totals, &square);
+        packed = square_next(s, n_ends, packed, &extents, 1, own);
+        const Lane least = log_density(s, scales[n_ends * a + s->central], load(own), s->n_halves[n_ends]);
+        store(others + n_ends * WIDTH, other);
+        store(most + n_ends * WIDTH, plus(other, -1.0, least));
     }
+    Py_ssize_t last = last_above(before, most, floors, n, width, n_ends);
     packed = s->packed;
     extents = s->extents;
-    if (n_asked) {
-        const Py_ssize_t n_possible = n_asked;
-        memset(s->sums, 0, a * WIDTH * sizeof(double));
-        packed = square_next(s, 0, packed, &extents, a, s->sums);
-        before = mix_lane(s, scales, s->n_halves[0]);
-        n_asked = 0;
-        for (Py_ssize_t j = 1; j <= n_possible; j++)
-            if (any_above(plus(before, 1.0, load(most + j * WIDTH)), some_of(floors + (j - 1) * n, width))) n_asked = j;
+    memset(s->sums, 0, a * WIDTH * sizeof(double));
+    for (Py_ssize_t j = 0; j < AHEAD && last > BEFORE; j++) {
+        packed = square_next(s, j, packed, &extents, a, s->sums);
+        const Lane begun = load(central);
+        store(central, here);
+        before = mix_lane(s, scales + BEFORE * a, s->n_halves[BEFORE]);
+        store(central, begun);
+        last = last_above(before, most, floors, n, width, last + 1);
     }
     double *to = found + place * n + first;
-    for (Py_ssize_t j = 1; j < n_ends; to += s->wanted[j++] * n) {
+    for (Py_ssize_t j = AHEAD; j < n_ends; to += s->wanted[j++] * n) {
         Lane answer = nothing;
-        if (j <= n_asked) {
+        if (j <= last) {
             packed = square_next(s, j, packed, &extents, a, s->sums);
             const Lane evidence = plus(plus(load(others + j * WIDTH), 1.0, before), -1.0, mix_lane(s, scales + j * a, s->n_halves[j]));
-            answer = where_above(evidence, some_of(floors + (j - 1) * n, width));
+            answer = take_above(evidence, floors + (j - AHEAD) * n, c->limits[j - AHEAD], width);
         }
         put(to, answer, width);
     }
@@ -1817,7 +1841,8 @@ INLINE void weigh_windows(const Windows *s, const Contrary *c, Py_ssize_t place,
     extents = s->extents;
     memset(s->sums, 0, a * WIDTH * sizeof(double));
     for (Py_ssize_t j = 0; j <= last; j++) packed = square_next(s, j, packed, &extents, a, s->sums);
-    put(found + place * s->n + first, where_above(plus(most, -1.0, mix_lane(s, scales, n_halves)), floor), width);
+    const Lane ratio = plus(most, -1.0, mix_lane(s, scales, n_halves));
+    put(found + place * s->n + first, take_above(ratio, c->floors + first, c->limits[0], width), width);
 }
 
 /* The maps of all accounts of a place, and if they are asked for those of the central one alone. */
@@ -1845,7 +1870,8 @@ static void weigh_all(const Windows *s, const Contrary *c, double *found)
         if (c->windows) pack_place(c->windows, place, 0);
         memset(s->sums, 0, s->n_accounts * WIDTH * sizeof(double));
         /* Of what came before a place, were it all as expected. */
-        const Lane most = mix_lane(s, s->scales + mapped_at(s, place) * s->n_sums * s->n_accounts, s->n_halves[0]);
+        const double *scales = s->scales + mapped_at(s, place) * s->n_sums * s->n_accounts;
+        const Lane most = c->windows ? everywhere(INFINITY) : mix_lane(s, scales + BEFORE * s->n_accounts, s->n_halves[BEFORE]);
         for (Py_ssize_t first = 0; first < s->n; first += WIDTH) {
             const Py_ssize_t width = s->n - first < WIDTH ? s->n - first : WIDTH;
             if (c->windows)

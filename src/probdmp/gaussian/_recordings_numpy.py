@@ -155,38 +155,51 @@ def window_evidence(
     stds: FloatArray,
     constants: FloatArray,
     floors: FloatArray,
+    limits: FloatArray,
     found: FloatArray,
     freedom: float,
     central: int,
 ) -> None:
-    """Evidence that all that follows the first end is at rest: ln p(all | at rest) - ln p(all) + ln p(first).
+    """Evidence that all that follows the second end is at rest: ln p(all | at rest) - ln p(all) + ln p(what came before).
 
-    p are mixtures sum_a (scale_a (1 + square_a / freedom))^-(n_halves / 2) over the accounts, the last one up to the first end.
-    A window ends with as many numbers as there are outputs, points of D numbers; at rest, those after the first end are the
-    last one before it and white noise, which that one has too. What is not above its floor is -infinity.
+    p are mixtures sum_a (scale_a (1 + square_a / freedom))^-(n_halves / 2) over the accounts, the last one up to the second
+    end; at the first it may be plain that there is no evidence. A window ends with as many numbers as there are outputs, points
+    of D numbers; at rest, those after the second end are the last one before it and white noise, which that one has too. What
+    is not above its floor is -infinity.
 
     Parameters
     ----------
     scales : (P, J, A) array, of each place and sum.
     n_halves : (J)
     stds : (D,) array, of the noise.
-    constants : (J - 1) logarithms of the density at rest where it is largest.
-    floors : (J - 1, n) array.
-    found : written: J - 1 arrays (wanted, n), one after the other.
+    constants : (J - 2) logarithms of the density at rest where it is largest.
+    floors : (J - 2, n) array; they rise to what is found, from place to place.
+    limits : (J - 2) up to which floors rise.
+    found : written: J - 2 arrays (wanted, n), one after the other.
     central : the account that is asked first.
     """
-    here, *together = _mixtures(values, rows, maps, which, ends, reach, wanted, scales, n_halves, freedom)
+    _, here, *together = _mixtures(values, rows, maps, which, ends, reach, wanted, scales, n_halves, freedom)
     n = values.shape[1]
     first, d = rows.shape[1] - maps.shape[1], len(stds)
-    since, end = first + int(ends[0]) - d, first + int(ends[-1])
+    since, end = first + int(ends[1]) - d, first + int(ends[-1])
     points = values[rows[: len(here), since:end]].reshape(len(here), (end - since) // d, d, n)
     moved = (points[:, 1:] - points[:, :1]) / stds[:, None]
-    of_each = zip(split_sums(found, wanted[1:], n), together, constants, floors, (ends[1:] - ends[0]) // d, strict=True)
-    for some, mixed, constant, floor, n_points in of_each:
+    n_ahead = (ends[2:] - ends[1]) // d
+    of_each = zip(split_sums(found, wanted[2:], n), together, constants, floors, limits, n_ahead, strict=True)
+    for some, mixed, constant, floor, limit, n_points in of_each:
         own = moved[: len(some), :n_points]
         squares = np.sum(own * own, axis=1) - np.sum(own, axis=1) ** 2 / (n_points + 1)
         some[:] = constant - squares.sum(axis=1) / 2 + here[: len(some)] - mixed
-        some[~(some > floor)] = -np.inf
+        _take_above(some, floor, limit)
+
+
+def _take_above(found: FloatArray, floors: FloatArray, limit: float) -> None:
+    """Leave of what is found, (G, n), only what is above its floor, (n,), which rises from place to place."""
+    risen = np.minimum(found, limit)
+    risen[~(found > floors)] = -np.inf
+    risen = np.maximum.accumulate(np.concatenate([floors[None], risen]), axis=0)
+    found[~(found > risen[:-1])] = -np.inf
+    floors[:] = risen[-1]
 
 
 def window_ratios(
@@ -204,6 +217,7 @@ def window_ratios(
     other_reach: IntArray,
     other_scales: FloatArray,
     floors: FloatArray,
+    limits: FloatArray,
     found: FloatArray,
     freedom: float,
     central: int,
@@ -213,7 +227,8 @@ def window_ratios(
     Parameters
     ----------
     other_maps, other_which, other_reach, other_scales : of p'.
-    floors : (n,) array.
+    floors : (n,) array; they rise to what is found, from place to place.
+    limits : (1) up to which floors rise.
     found : written: a single array (wanted, n).
     central : the account that is asked first.
     """
@@ -226,7 +241,7 @@ def window_ratios(
         )
     )
     np.subtract(other, together, out=ratios)
-    ratios[~(ratios > floors)] = -np.inf
+    _take_above(ratios, floors, limits[0])
 
 
 def whiten(
