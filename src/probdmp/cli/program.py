@@ -1,5 +1,7 @@
 """The program: its verbs, what they share, and where every error ends."""
 
+import atexit
+import gc
 import io
 import re
 import sys
@@ -121,4 +123,5 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without ± shows a question mark
+    atexit.register(gc.freeze)  # a process that ends need not look for cycles in what it leaves behind
     app(prog_name="probdmp")

@@ -19,7 +19,6 @@ from probdmp.errors import DataFileError, ProbDMPError
 from probdmp.fleet.plan import Part
 from probdmp.fleet.scorer import Scorer
 from probdmp.io import ExecutionTable, ParquetExecutions
-from probdmp.io.read_ahead import read_ahead
 
 __all__ = ["Assignment", "Worker", "one_thread_each", "process_pool", "score_here", "score_in_processes"]
 
@@ -70,10 +69,10 @@ class Worker:
         self._columns = self._scorer.columns(self._file.layout, self._file.path)
 
     def scores(self, parts: Iterable[Part]) -> Iterator[tuple[int, bytes]]:
-        """Of each part its index and its scores, a Parquet file; the next is begun meanwhile, and that after it read."""
+        """Of each part its index and its scores, a Parquet file; the next is read and begun meanwhile."""
         from threadpoolctl import threadpool_limits
 
-        pieces = read_ahead((part, table) for part in parts for table in self._file.read(part.span, self._columns))
+        pieces = ((part, table) for part in parts for table in self._file.read(part.span, self._columns))
         with threadpool_limits(1, "blas"):  # threads share executions; those of the linear algebra would be in their way
             for number, begun in itertools.groupby(_one_behind(self._begun(pieces)), key=itemgetter(0)):
                 yield number, _payload([ended() for _, ended in begun])

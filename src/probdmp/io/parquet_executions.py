@@ -174,8 +174,10 @@ class ParquetExecutions:
             if complete == done or (n_read - base < PIECE and complete < len(counts)):
                 continue
             rows, n_rows = pa.Table.from_batches(held), int(ends[complete - 1]) - base
-            yield table_of_samples(rows.slice(0, n_rows), self.layout, columns, counts[done:complete])
+            table = table_of_samples(rows.slice(0, n_rows), self.layout, columns, counts[done:complete])
             held, base, done = rows.slice(n_rows).to_batches(), base + n_rows, complete
+            del rows, batch  # or they would be kept while this waits to be asked for more
+            yield table
 
     def _without_rest(self, span: Span, counts: IntArray, names: Sequence[str]) -> Iterator[Any]:
         """Batches of a span without all but the first row of executions that are too long."""

@@ -52,7 +52,7 @@ class ExecutionTable:
 
 
 def joined(tables: Sequence[ExecutionTable]) -> ExecutionTable:
-    """Tables of one file as one, in their order."""
+    """Tables of one file as one, in their order; they lose their columns to it one by one, or memory would hold all twice."""
     import pyarrow as pa
 
     if len(tables) == 1:
@@ -68,7 +68,7 @@ def joined(tables: Sequence[ExecutionTable]) -> ExecutionTable:
         np.append(np.concatenate(offsets), bases[-1]),
         np.concatenate([table.counts for table in tables]),
         np.concatenate([table.steps for table in tables]),
-        {name: np.concatenate([table.columns[name] for table in tables]) for name in tables[0].columns},
+        {name: np.concatenate([table.columns.pop(name) for table in tables]) for name in list(tables[0].columns)},
         {name: np.concatenate([table.told[name] for table in tables]) for name in tables[0].told},
         np.concatenate([table.problems for table in tables]),
     )
