@@ -34,7 +34,7 @@ SLOWED = 0.5
 """Speed of what is called slow."""
 FIRST_BEFORE = 4
 """Points before after which it mostly is plain how unlikely they are altogether."""
-FIRST_AHEAD = 3
+FIRST_AHEAD = 2
 """Points ahead after which it mostly is plain that an execution has not slowed down."""
 
 
