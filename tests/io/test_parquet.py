@@ -109,6 +109,11 @@ def test_both_layouts_say_the_same_however_rows_are_grouped(tmp_path, monkeypatc
         assert_same_demonstrations(read_parquet(dense), demonstrations)
 
 
+def column_of(tables, name):
+    """All samples, of one execution after the other."""
+    return np.concatenate([table.execution(i)[name] for table in tables for i in range(len(table))])
+
+
 @pytest.mark.parametrize("rows", [rows_of, dense_rows_of])
 def test_executions_come_in_as_few_tables_as_memory_allows(tmp_path, monkeypatch, rows):
     """About equally large ones, with the same in them; labels are numbered anew in each."""
@@ -119,12 +124,12 @@ def test_executions_come_in_as_few_tables_as_memory_allows(tmp_path, monkeypatch
     span = Span(0, int(starts[-1]), None if file.layout.is_dense else np.diff(starts))
     monkeypatch.setattr(parquet_executions, "PIECE", 40)
     (whole,) = file.read(span, ["x", "y"])
-    monkeypatch.setattr(parquet_executions, "TABLE", len(whole.columns["x"]))
+    monkeypatch.setattr(parquet_executions, "TABLE", len(column_of([whole], "x")))
     tables = list(file.read(span, ["x", "y"]))
     assert max(map(len, tables)) < 9 == sum(map(len, tables))
     assert 2 <= len(tables) <= 4
     for name in ("x", "y"):
-        np.testing.assert_array_equal(np.concatenate([table.columns[name] for table in tables]), whole.columns[name])
+        np.testing.assert_array_equal(column_of(tables, name), column_of([whole], name))
     for table in (whole, *tables):
         names = [name.as_py() for name in table.ids]
         assert [table.labels[code] for code in table.codes] == ["cab"[int(name[1:]) // 3] for name in names]
@@ -246,7 +251,7 @@ def test_too_long_an_execution_is_not_kept_in_memory(tmp_path, monkeypatch):
     tables = list(file.read(Span(0, int(lengths.sum()), lengths), ["x"]))
     assert [name.as_py() for table in tables for name in table.ids] == list("abcde")
     assert [bool(usable) for table in tables for usable in table.usable] == [True, False, True, False, True]
-    assert sum(len(table.columns["x"]) for table in tables) == 50 + 1 + 40 + 1 + 30
+    assert len(column_of(tables, "x")) == 50 + 1 + 40 + 1 + 30
 
 
 @pytest.mark.parametrize("share", [0.0, 0.01, 0.5, 0.99, 0.999])

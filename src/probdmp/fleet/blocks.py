@@ -1,6 +1,6 @@
 """Executions that can be judged side by side: of one primitive, equally long, at one rate."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from probdmp.checks import FloatArray, IntArray
 from probdmp.dmp import Primitive, Task
 from probdmp.io import ExecutionTable
 
-__all__ = ["alike", "observations_of", "tasks_of"]
+__all__ = ["alike", "tasks_of"]
 
 MOST_SAMPLES = 2**19
 """Of the executions of a block together: what a few thousand short ones have."""
@@ -18,7 +18,7 @@ DIGITS = 2.0**40
 
 
 def alike(table: ExecutionTable, owners: IntArray) -> Iterator[IntArray]:
-    """Places of executions that make a block, block by block.
+    """Places of executions that make a block, increasing, block by block.
 
     Parameters
     ----------
@@ -43,30 +43,15 @@ def _rounded(steps: FloatArray) -> FloatArray:
     return np.ldexp(np.round(mantissas * DIGITS) / DIGITS, exponents)
 
 
-def observations_of(table: ExecutionTable, which: IntArray, names: Sequence[str]) -> FloatArray:
-    """Columns of executions that are equally long, (N, T, C) array; NaN where a column is not in the file."""
-    starts = table.offsets[which]
-    n_samples = int(table.offsets[which[0] + 1] - starts[0])
-    values = np.empty((len(which), n_samples, len(names)))
-    # Whole rows are copied at once where all executions, not only these, are equally long.
-    by_rows = bool((np.diff(table.offsets) == n_samples).all())
-    places = which if by_rows else starts[:, None] + np.arange(n_samples)
-    for i, name in enumerate(names):
-        column = table.columns.get(name)
-        values[:, :, i] = np.nan if column is None else (column.reshape(-1, n_samples) if by_rows else column)[places]
-    return values
-
-
 def tasks_of(table: ExecutionTable, which: IntArray, primitive: Primitive) -> Task:
     """What executions were told, as one batch: without it, their first row, no goal, and the learned duration."""
 
     def told(name: str) -> FloatArray:
         return table.told[name][which] if name in table.told else np.full(len(which), np.nan)
 
-    def seen(name: str) -> FloatArray:
-        return table.columns[name][table.offsets[which]] if name in table.columns else np.full(len(which), np.nan)
-
-    starts = [np.where(np.isnan(told(f"start_{name}")), seen(name), told(f"start_{name}")) for name in primitive.names]
+    starts = [
+        np.where(np.isnan(told(f"start_{name}")), table.first(which, name), told(f"start_{name}")) for name in primitive.names
+    ]
     goals = [told(f"goal_{name}") for name in primitive.names]
     durations = told("duration")
     return Task(

@@ -12,7 +12,7 @@ from probdmp.detection import FailureDetector
 from probdmp.dmp import Primitive
 from probdmp.errors import DataFileError, InputError, InputTypeError, ModelFileError, ProbDMPError
 from probdmp.execution import ChannelSensor, ExecutionBatch, SensorArray, score_batch
-from probdmp.fleet.blocks import alike, observations_of, tasks_of
+from probdmp.fleet.blocks import alike, tasks_of
 from probdmp.fleet.scores import Scores
 from probdmp.io import ExecutionTable, decode_model
 from probdmp.io.parquet_layout import DURATION, ParquetLayout
@@ -111,7 +111,7 @@ class Scorer:
         """A block; where it is refused, the executions that are to blame get the reason, the others their scores."""
         primitive, array = self.primitives[self._labels[owner]], self._arrays[owner]
         try:
-            values = observations_of(table, which, array.outputs)
+            values = table.measured(which, array.outputs)
             batch = ExecutionBatch(values, tasks_of(table, which, primitive), float(table.steps[which[0]]))
             scores.put(which, self.detector.judge(primitive, batch), score_batch(primitive, batch, array))
         except (ProbDMPError, ArithmeticError, np.linalg.LinAlgError) as error:

@@ -109,8 +109,7 @@ def _take(table: ExecutionTable, i: int, file: ParquetExecutions, names: tuple[s
     if table.problems[i]:
         taught.left_out[table.problems[i]] += 1
         return
-    samples = slice(int(table.offsets[i]), int(table.offsets[i + 1]))
-    columns = {name: values[samples] for name, values in table.columns.items()}
+    columns = table.execution(i)
     positions = np.column_stack([columns.pop(name) for name in names])
     label, units = table.labels[table.codes[i]], file.layout.units.get(names[0], "")
     try:

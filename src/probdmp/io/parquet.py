@@ -49,23 +49,15 @@ def read_parquet(path: str | os.PathLike[str], selection: Selection = EVERYTHING
         return demonstrations_of(read_foreign(path, selection), selection, name)
     file = ParquetExecutions(path)
     tables, executions = _read_all(file)
-    data = np.concatenate([np.column_stack([table.columns[name] for name in file.layout.columns]) for table in tables])
-    lengths = np.concatenate([np.diff(table.offsets) for table in tables])
     steps = np.concatenate([table.steps for table in tables]).tolist()
     labels = [executions.labels[code] or "" if code >= 0 else "" for code in executions.codes.tolist()]
     if selection.dt is None and len(set(steps)) > 1:
         hint = "Resample them to one: dt=0.01, --dt 0.01 on the command line."
         raise DataFileError(f"one rate for all executions in {name}", f"dt of {sorted(set(steps))!r:.100}", hint)
-    samples = np.split(data, np.cumsum(lengths)[:-1])
+    samples = [(table.execution(i), int(n)) for table in tables for i, n in enumerate(np.diff(table.offsets))]
     own = [
-        Table(
-            dict(zip(file.layout.columns, values.T, strict=True)),
-            step * np.arange(len(values), dtype=np.float64),
-            label,
-            f"in execution {i + 1}",
-            file.layout.units,
-        )
-        for i, (values, step, label) in enumerate(zip(samples, steps, labels, strict=True))
+        Table(columns, step * np.arange(n, dtype=np.float64), label, f"in execution {i + 1}", file.layout.units)
+        for i, ((columns, n), step, label) in enumerate(zip(samples, steps, labels, strict=True))
     ]
     recordings = recordings_of(own, file.layout.positions, {}, selection.dt or steps[0], name)
     return demonstrations_of(recordings, selection, name)

@@ -1,7 +1,8 @@
 """Executions of a Parquet file as flat arrays, a few thousand at a time, without an object for each."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain, pairwise
 from typing import Any
 
 import numpy as np
@@ -31,8 +32,10 @@ class ExecutionTable:
     """(N,) array: how many samples there are in the file, without those that were left out of an even clock."""
     steps: FloatArray
     """(N,) array, seconds between samples."""
-    columns: dict[str, FloatArray]
-    """(sum T,) arrays, units of the file; NaN where nothing was measured."""
+    columns: dict[str, list[FloatArray]]
+    """What was measured, in P arrays of samples, one after the other; units of the file, NaN where nothing was measured."""
+    pieces: IntArray
+    """(P + 1,) array: executions `pieces[p]:pieces[p + 1]` are in array p of each column."""
     told: dict[str, FloatArray]
     """(N,) arrays; NaN where nothing was told."""
     problems: NDArray[np.object_]
@@ -50,9 +53,51 @@ class ExecutionTable:
         """(N,) array."""
         return np.asarray(self.problems == "", dtype=np.bool_)
 
+    def measured(self, which: IntArray, names: Sequence[str]) -> FloatArray:
+        """Columns of executions that are equally long, (n, T, C) array; NaN where a column is not in the file.
+
+        Parameters
+        ----------
+        which : (n,) increasing.
+        """
+        length = int(np.diff(self.offsets[which[0] : which[0] + 2])[0])
+        values = np.empty((len(which), length, len(names)))
+        for p, some in self._by_piece(which):
+            offsets = self.offsets[self.pieces[p] : self.pieces[p + 1] + 1]
+            # Whole rows are copied at once where all executions, not only these, are equally long.
+            by_rows = bool((np.diff(offsets) == length).all())
+            own = which[some] - self.pieces[p]
+            places = own if by_rows else (offsets[own] - offsets[0])[:, None] + np.arange(length)
+            for i, name in enumerate(names):
+                if name not in self.columns:
+                    values[some, :, i] = np.nan
+                    continue
+                column = self.columns[name][p]
+                values[some, :, i] = (column.reshape(-1, length) if by_rows else column)[places]
+        return values
+
+    def first(self, which: IntArray, name: str) -> FloatArray:
+        """What executions, (n,) increasing, began with, (n,) array; NaN where a column is not in the file."""
+        begun = np.full(len(which), np.nan)
+        for p, some in self._by_piece(which) if name in self.columns else ():
+            begun[some] = self.columns[name][p][self.offsets[which[some]] - self.offsets[self.pieces[p]]]
+        return begun
+
+    def execution(self, i: int) -> dict[str, FloatArray]:
+        """All columns of one execution, (T,) arrays."""
+        p = int(np.searchsorted(self.pieces, i, side="right")) - 1
+        start, stop = (self.offsets[i : i + 2] - self.offsets[self.pieces[p]]).tolist()
+        return {name: arrays[p][start:stop] for name, arrays in self.columns.items()}
+
+    def _by_piece(self, which: IntArray) -> Iterator[tuple[int, slice]]:
+        """Which of increasing places are in each piece."""
+        for p, (begin, end) in enumerate(pairwise(np.searchsorted(which, self.pieces).tolist())):
+            if end > begin:
+                yield p, slice(begin, end)
+
 
 def joined(tables: Sequence[ExecutionTable]) -> ExecutionTable:
-    """Tables of one file as one, in their order; they lose their columns to it one by one, or memory would hold all twice."""
+    """Tables of one file as one, in their order; what was measured is not copied."""
     import pyarrow as pa
 
     if len(tables) == 1:
@@ -68,7 +113,8 @@ def joined(tables: Sequence[ExecutionTable]) -> ExecutionTable:
         np.append(np.concatenate(offsets), bases[-1]),
         np.concatenate([table.counts for table in tables]),
         np.concatenate([table.steps for table in tables]),
-        {name: np.concatenate([table.columns.pop(name) for table in tables]) for name in list(tables[0].columns)},
+        {name: list(chain.from_iterable(table.columns[name] for table in tables)) for name in tables[0].columns},
+        np.cumsum([0, *chain.from_iterable(np.diff(table.pieces) for table in tables)]),
         {name: np.concatenate([table.told[name] for table in tables]) for name in tables[0].told},
         np.concatenate([table.problems for table in tables]),
     )
@@ -96,7 +142,8 @@ def table_of_samples(rows: Any, layout: ParquetLayout, wanted: Sequence[str], co
             offsets=offsets,
             counts=counts,
             steps=np.full(len(counts), np.nan),
-            columns={name: numbers_of(rows[name]) for name in wanted},
+            columns={name: [numbers_of(rows[name])] for name in wanted},
+            pieces=np.array([0, len(counts)]),
             told={name: values for name, (values, _) in told.items()},
             problems=np.full(len(counts), "", dtype=object),
         ),
@@ -113,7 +160,7 @@ def table_of_lists(rows: Any, layout: ParquetLayout, wanted: Sequence[str]) -> E
     lengths = np.stack([list_lengths(rows[name]) for name in names])
     counts = lengths.max(axis=0)
     extents = np.maximum(counts, 1)
-    columns = {name: _aligned(numbers_of(rows[name]), own, extents) for name, own in zip(names, lengths, strict=True)}
+    columns = {name: [_aligned(numbers_of(rows[name]), own, extents)] for name, own in zip(names, lengths, strict=True)}
     codes, labels = codes_of(rows[layout.label]) if layout.label else (np.full(len(rows), -1), [])
     table = ExecutionTable(
         ids=plain_names(rows[ID]),
@@ -123,12 +170,13 @@ def table_of_lists(rows: Any, layout: ParquetLayout, wanted: Sequence[str]) -> E
         counts=counts,
         steps=np.full(len(rows), np.nan) if layout.has_times else numbers_of(rows[STEP]),
         columns=columns,
+        pieces=np.array([0, len(rows)]),
         told={name: numbers_of(rows[name]) for name in layout.told},
         problems=np.full(len(rows), "", dtype=object),
     )
     uneven = ((lengths != counts) & (lengths > 0)).any(axis=0)
     table.refuse(uneven, f"Expected lists of one length in {', '.join(names)}, got several.")
-    return _timed(columns.pop(TIME), table) if layout.has_times else _checked(table)
+    return _timed(columns.pop(TIME)[0], table) if layout.has_times else _checked(table)
 
 
 def _aligned(values: FloatArray, lengths: IntArray, counts: IntArray) -> FloatArray:
@@ -158,9 +206,10 @@ def _regridded(table: ExecutionTable, places: IntArray | None) -> ExecutionTable
     offsets = np.concatenate([[0], np.cumsum(extents)])
     targets = places + np.repeat(offsets[:-1], np.diff(table.offsets))
     columns = {}
-    for name, values in table.columns.items():
-        columns[name] = np.full(int(offsets[-1]), np.nan)
-        columns[name][targets] = values
+    for name, (values,) in table.columns.items():
+        spread = np.full(int(offsets[-1]), np.nan)
+        spread[targets] = values
+        columns[name] = [spread]
     return replace(table, offsets=offsets, columns=columns)
 
 
@@ -176,7 +225,7 @@ def _checked(table: ExecutionTable) -> ExecutionTable:
     shortest, longest = SECONDS
     wrong = ~((table.steps >= shortest) & (table.steps <= longest))
     table.refuse(wrong, f"Expected {shortest:g} to {longest:g} seconds between samples, got something else.")
-    for name, values in table.columns.items():
+    for name, (values,) in table.columns.items():
         if max(np.fmax.reduce(values, initial=0.0), -np.fmin.reduce(values, initial=0.0)) > LARGEST_MAGNITUDE:
             wrong = np.logical_or.reduceat(np.abs(values) > LARGEST_MAGNITUDE, table.offsets[:-1])
             table.refuse(wrong, f"Expected {name} finite, or null where it was not measured, got infinity or nearly so.")
