@@ -44,8 +44,9 @@ def parts_of(file: ParquetExecutions, executions: Executions, samples: int = PAR
     edges = np.unique(np.concatenate([[0], cuts, [len(executions)]]))
     parts = []
     for index, (first, last) in enumerate(zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True)):
-        counts = None if file.layout.is_dense else np.diff(starts[first : last + 1])
-        span = Span(int(starts[first]), int(starts[last]), counts)
+        span = Span(int(starts[first]), int(starts[last]), None)
+        if not file.layout.is_dense:
+            span = span._replace(counts=np.diff(starts[first : last + 1]), ids=executions.ids[first:last].combine_chunks())
         parts.append(Part(index, first, last - first, span, np.flatnonzero(repeated[first:last])))
     return parts
 

@@ -40,6 +40,8 @@ class Span(NamedTuple):
     """Row after the last one."""
     counts: IntArray | None
     """(N,) array: rows of each execution; None where a row is an execution."""
+    ids: Any = None
+    """(N) Arrow array: names of executions of several rows, where they need not be read again."""
 
 
 class Executions(NamedTuple):
@@ -147,7 +149,8 @@ class ParquetExecutions:
         """
         layout = self.layout
         clock = [TIME] if layout.has_times else [STEP]
-        names = [ID, *([layout.label] if layout.label else []), *clock, *columns, *layout.told]
+        name = [ID] if span.ids is None else []
+        names = [*name, *([layout.label] if layout.label else []), *clock, *columns, *layout.told]
         if span.counts is None:
             size = max(int(PIECE / max(self.samples_per_row, 1)), 1)
             batches = self._batches(span.start, span.stop, names, size)
@@ -174,7 +177,8 @@ class ParquetExecutions:
             if complete == done or (n_read - base < PIECE and complete < len(counts)):
                 continue
             rows, n_rows = pa.Table.from_batches(held), int(ends[complete - 1]) - base
-            table = table_of_samples(rows.slice(0, n_rows), self.layout, columns, counts[done:complete])
+            ids = None if span.ids is None else span.ids[done:complete]
+            table = table_of_samples(rows.slice(0, n_rows), self.layout, columns, counts[done:complete], ids)
             held, base, done = rows.slice(n_rows).to_batches(), base + n_rows, complete
             del rows, batch  # or they would be kept while this waits to be asked for more
             yield table

@@ -120,7 +120,9 @@ def joined(tables: Sequence[ExecutionTable]) -> ExecutionTable:
     )
 
 
-def table_of_samples(rows: Any, layout: ParquetLayout, wanted: Sequence[str], counts: IntArray) -> ExecutionTable:
+def table_of_samples(
+    rows: Any, layout: ParquetLayout, wanted: Sequence[str], counts: IntArray, ids: Any = None
+) -> ExecutionTable:
     """From rows that are samples.
 
     Parameters
@@ -128,6 +130,7 @@ def table_of_samples(rows: Any, layout: ParquetLayout, wanted: Sequence[str], co
     rows : Arrow table; of executions that are too long the first row only.
     wanted : columns to keep.
     counts : (N,) array: samples of each execution in the file.
+    ids : (N) Arrow array; from the rows unless given.
     """
     offsets = np.concatenate([[0], np.cumsum(np.where(counts > LONGEST_RECORDING, 1, counts))])
     firsts = offsets[:-1]
@@ -136,7 +139,7 @@ def table_of_samples(rows: Any, layout: ParquetLayout, wanted: Sequence[str], co
     table = _timed(
         seconds_of(rows[TIME]),
         ExecutionTable(
-            ids=plain_names(rows[ID].take(firsts) if len(rows) else rows[ID]),
+            ids=plain_names(rows[ID].take(firsts)) if ids is None else ids,
             codes=codes[firsts],
             labels=labels,
             offsets=offsets,
