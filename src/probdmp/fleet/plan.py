@@ -1,5 +1,6 @@
 """A file of executions, cut into parts that are scored by themselves."""
 
+from math import ceil
 from typing import NamedTuple
 
 import numpy as np
@@ -9,8 +10,10 @@ from probdmp.io import Executions, ParquetExecutions, Span
 
 __all__ = ["PART_SAMPLES", "Part", "parts_of", "repeated_ids"]
 
-PART_SAMPLES = 2**22
+PART_SAMPLES = 2**23
 """Samples of a part, about: what a run that is killed loses at most, per process."""
+FIRST = 1 / 4
+"""Of a part: how large the first one is, more than NEARBY."""
 NEARBY = 1 / 8
 """Of a part: so far from where it should end, it ends with a row group instead, which is then read for one part alone."""
 
@@ -37,7 +40,8 @@ def parts_of(file: ParquetExecutions, executions: Executions, samples: int = PAR
     starts, repeated = executions.starts, repeated_ids(executions)
     per_row = file.samples_per_row if file.layout.is_dense else 1.0
     rows = max(int(samples / max(per_row, 1.0)), 1)
-    ends, nearby = np.arange(rows, max(int(starts[-1]), 1), rows), int(rows * NEARBY)
+    # The first one is small: nothing can be scored while it is read.
+    ends, nearby = np.arange(ceil(rows * FIRST), max(int(starts[-1]), 1), rows), int(rows * NEARBY)
     last = file.bounds[np.searchsorted(file.bounds, ends + nearby, side="right") - 1]
     # A part ends where the execution ends in which its last row is.
     cuts = np.searchsorted(starts, np.where(np.abs(last - ends) <= nearby, last, ends), side="left")

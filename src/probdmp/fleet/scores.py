@@ -12,12 +12,14 @@ from probdmp.io.parquet_layout import ID, LABEL
 if TYPE_CHECKING:
     from probdmp.detection.batch import BatchJudgement
 
-__all__ = ["ERROR", "FAILED", "FINE", "VERDICTS", "Scores", "score_schema"]
+__all__ = ["ENCODED", "ERROR", "FAILED", "FINE", "VERDICTS", "Scores", "score_schema"]
 
 VERDICTS = FINE, FAILED, ERROR = ("fine", "failed", "error")
 TEXTS = {"kind": "kinds", "cause": "causes", "blamed": "blamed", "better": "betters"}
 """By column: the texts of a `BatchJudgement`."""
 FLAGS = ("is_stale", "has_sensor_fault")
+ENCODED = [LABEL, "verdict", *TEXTS, "error"]
+"""Columns of few different values, which a Parquet file numbers; of others it would try to, in vain."""
 
 
 def score_schema(id_type: Any) -> Any:

@@ -17,7 +17,7 @@ from probdmp.fleet.cluster import require_distributed, score_on_cluster
 from probdmp.fleet.parts_folder import PartsFolder, is_begun
 from probdmp.fleet.plan import PART_SAMPLES, Part, parts_of
 from probdmp.fleet.scorer import Scorer
-from probdmp.fleet.scores import score_schema
+from probdmp.fleet.scores import ENCODED, score_schema
 from probdmp.fleet.work import Assignment, score_here, score_in_processes
 from probdmp.io import ParquetExecutions
 from probdmp.io.atomic import replacing
@@ -140,7 +140,7 @@ def _put_together(
 
     metadata = {f"probdmp.{name}": value for name, value in identity.items()}
     counts: dict[str, Counter[str]] = {}
-    with replacing(target) as file, pq.ParquetWriter(file, schema.with_metadata(metadata)) as writer:
+    with replacing(target) as file, pq.ParquetWriter(file, schema.with_metadata(metadata), use_dictionary=ENCODED) as writer:
         for table in read_ahead(folder.tables(n_parts)):
             writer.write_table(table.cast(schema).replace_schema_metadata(metadata))
             for label, verdict, count in _counted(table):

@@ -1,7 +1,6 @@
 """Scoring parts of a file, in this process or in others."""
 
 import io
-import itertools
 import multiprocessing
 import os
 import threading
@@ -9,7 +8,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from operator import itemgetter
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -18,7 +16,8 @@ from probdmp import __version__
 from probdmp.errors import DataFileError, ProbDMPError
 from probdmp.fleet.plan import Part
 from probdmp.fleet.scorer import Scorer
-from probdmp.io import ExecutionTable, ParquetExecutions
+from probdmp.fleet.scores import ENCODED
+from probdmp.io import ParquetExecutions
 
 __all__ = ["Assignment", "Worker", "one_thread_each", "process_pool", "score_here", "score_in_processes"]
 
@@ -72,19 +71,26 @@ class Worker:
         """Of each part its index and its scores, a Parquet file; the next is read and begun meanwhile."""
         from threadpoolctl import threadpool_limits
 
-        pieces = ((part, table) for part in parts for table in self._file.read(part.span, self._columns))
+        done: list[Any] = []
         with threadpool_limits(1, "blas"):  # threads share executions; those of the linear algebra would be in their way
-            for number, begun in itertools.groupby(_one_behind(self._begun(pieces)), key=itemgetter(0)):
-                yield number, _payload([ended() for _, ended in begun])
+            for number, ended in _one_behind(self._begun(parts)):
+                done.append(ended())
+                del ended  # or the executions that are scored would be kept while others are read
+                if number is not None:
+                    yield number, _payload(done)
+                    done.clear()
 
-    def _begun(self, pieces: Iterable[tuple[Part, ExecutionTable]]) -> Iterator[tuple[int, Callable[[], Any]]]:
-        for _, of_part in itertools.groupby(pieces, key=lambda piece: piece[0].number):
-            done = 0
-            for part, table in of_part:
-                again = np.isin(np.arange(done, done + len(table)), part.repeated)
+    def _begun(self, parts: Iterable[Part]) -> Iterator[tuple[int | None, Callable[[], Any]]]:
+        """Of each table what waits for its scores, with the number of the part that ends with it."""
+        for part in parts:
+            tables, n_begun = self._file.read(part.span, self._columns), 0
+            table = next(tables, None)
+            while table is not None:
+                again = np.isin(np.arange(n_begun, n_begun + len(table)), part.repeated)
                 table.refuse(again, "Expected each execution_id once, its rows together, got it in several places of the file.")
-                done += len(table)
-                yield part.number, self._scorer.begin(table)
+                n_begun, ended = n_begun + len(table), self._scorer.begin(table)
+                table = next(tables, None)
+                yield part.number if table is None else None, ended
 
 
 def score_here(assignment: Assignment, parts: Sequence[Part]) -> Iterator[tuple[int, bytes]]:
@@ -187,5 +193,5 @@ def _payload(tables: list[Any]) -> bytes:
     import pyarrow.parquet as pq
 
     buffer = io.BytesIO()
-    pq.write_table(pa.concat_tables(tables).unify_dictionaries().combine_chunks(), buffer)
+    pq.write_table(pa.concat_tables(tables).unify_dictionaries().combine_chunks(), buffer, use_dictionary=ENCODED)
     return buffer.getvalue()
