@@ -83,14 +83,12 @@ class Worker:
     def _begun(self, parts: Iterable[Part]) -> Iterator[tuple[int | None, Callable[[], Any]]]:
         """Of each table what waits for its scores, with the number of the part that ends with it."""
         for part in parts:
-            tables, n_begun = self._file.read(part.span, self._columns), 0
-            table = next(tables, None)
-            while table is not None:
+            n_begun = 0
+            for table in self._file.read(part.span, self._columns):
                 again = np.isin(np.arange(n_begun, n_begun + len(table)), part.repeated)
                 table.refuse(again, "Expected each execution_id once, its rows together, got it in several places of the file.")
-                n_begun, ended = n_begun + len(table), self._scorer.begin(table)
-                table = next(tables, None)
-                yield part.number if table is None else None, ended
+                n_begun += len(table)
+                yield part.number if n_begun == part.n_executions else None, self._scorer.begin(table)
 
 
 def score_here(assignment: Assignment, parts: Sequence[Part]) -> Iterator[tuple[int, bytes]]:
