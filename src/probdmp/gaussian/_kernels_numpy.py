@@ -9,16 +9,8 @@ import numpy as np
 
 from probdmp.checks import LARGEST_MAGNITUDE, FloatArray, is_plain
 from probdmp.gaussian._augmented_numpy import augmented_step
-from probdmp.gaussian._recordings_numpy import (
-    least_squares,
-    plain_recordings,
-    points_on_lines,
-    split_sums,
-    whiten,
-    window_evidence,
-    window_ratios,
-    window_sums,
-)
+from probdmp.gaussian._recordings_numpy import plain_recordings, points_on_lines, whiten
+from probdmp.gaussian._windows_numpy import least_squares, split_sums, window_evidence, window_ratios, window_sums
 
 __all__ = [
     "PreparedSteps",
