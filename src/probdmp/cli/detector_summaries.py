@@ -15,7 +15,8 @@ __all__ = ["calibration_text", "detector_summary", "percent", "print_detector", 
 TOLD = {"known": "goal and duration told", "nominal": "only the start told"}
 SOURCES = {"leave_one_out": "leave-one-out", "held_out": "held-out"}
 FLAGGED = (
-    "Flagged, since they surprise more than chance explains, with the share of their executions among the most surprising tenth"
+    "Flagged, since more of their executions are among the most surprising tenth than chance explains, or all of them rank "
+    "higher; with the share among that tenth"
 )
 
 

@@ -16,6 +16,7 @@ from probdmp.fleet.blocks import alike, tasks_of
 from probdmp.fleet.scores import Scores
 from probdmp.io import ExecutionTable, decode_model
 from probdmp.io.parquet_layout import DURATION, ParquetLayout
+from probdmp.io.recordings import listing
 
 __all__ = ["Scorer"]
 
@@ -128,7 +129,7 @@ class Scorer:
         default = 0 if alone else -1
         found = [default if alone and "" in (label, *places) else places.get(label, -1) for label in table.labels]
         owners = np.array([*found, default], dtype=np.int64)[table.codes]
-        table.refuse(owners < 0, f"Expected one of {', '.join(map(repr, self._labels[:20]))} as primitive, got none of these.")
+        table.refuse(owners < 0, f"Expected one of {listing(map(repr, self._labels))} as primitive, got none of these.")
         return owners
 
     def _check(self, table: ExecutionTable, owners: IntArray) -> None:
