@@ -56,8 +56,8 @@ CAUSES = {
         "bytecode is not kept (PYTHONDONTWRITEBYTECODE) they are compiled at every start, too"
     ),
     "fleet": (
-        "of one thread (`python benchmarks/fleet_scoring.py 60000 --profile`, on the machine above) 41 % are the windows of "
-        "the trajectory, 18 % reading, 8 % the log-likelihood, 8 % when it was most surprising, 6 % the reasons of the 3 % "
+        "of one thread (`python benchmarks/fleet_scoring.py 60000 --profile`, on the machine above) 44 % are the windows of "
+        "the trajectory, 21 % reading, 8 % the log-likelihood, 6 % when it was most surprising, 6 % the reasons of the 3 % "
         "that failed, the rest is in small parts; and the cores of this virtual machine differ by a factor of two from hour "
         "to hour, see how fast they were"
     ),
