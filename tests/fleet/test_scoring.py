@@ -264,6 +264,15 @@ def test_another_model_or_file_does_not_go_on_but_may_begin_anew(fleet, write, r
     assert_alike(rows(scored(fleet.quick, path, restart=True)[0]), reference)
 
 
+def test_parts_that_were_cut_in_another_way_are_not_gone_on_with(fleet, write, monkeypatch):
+    path = write("long", rows_of(fleet.executions))
+    with pytest.raises(Stopped):
+        scored(fleet.quick, path, part_samples=60, on_part=stop_after(1))
+    monkeypatch.setattr("probdmp.fleet.scoring.PLAN", 0)
+    with pytest.raises(InputError, match=r"the plan that .* --restart"):
+        scored(fleet.quick, path)
+
+
 def test_two_runs_do_not_write_to_the_same_output(fleet, write):
     path = write("long", rows_of(fleet.executions))
 
@@ -381,4 +390,4 @@ def test_the_manifest_is_plain_json(fleet, write):
     with pytest.raises(Stopped):
         scored(fleet.quick, path, part_samples=60, on_part=stop_after(1))
     folder = path.with_name(".long.scores.parquet.parts")
-    assert set(json.loads((folder / "run.json").read_text())) == {"schema", "version", "model", "executions", "samples"}
+    assert set(json.loads((folder / "run.json").read_text())) == {"schema", "version", "model", "executions", "plan", "samples"}

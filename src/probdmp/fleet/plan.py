@@ -8,10 +8,12 @@ import numpy as np
 from probdmp.checks import BoolArray, IntArray
 from probdmp.io import Executions, ParquetExecutions, Span
 
-__all__ = ["PART_SAMPLES", "Part", "parts_of", "repeated_ids"]
+__all__ = ["PART_SAMPLES", "PLAN", "Part", "parts_of", "repeated_ids"]
 
 PART_SAMPLES = 2**23
 """Samples of a part, about: what a run that is killed loses at most, per process."""
+PLAN = 2
+"""Number of the way in which parts are cut: a run goes on only with parts that were cut in the same way."""
 FIRST = 1 / 4
 """Of a part: how large the first one is, more than NEARBY."""
 NEARBY = 1 / 8

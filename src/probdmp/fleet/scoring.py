@@ -15,7 +15,7 @@ from probdmp.checks import check_count
 from probdmp.errors import InputError, ModelFileError
 from probdmp.fleet.cluster import require_distributed, score_on_cluster
 from probdmp.fleet.parts_folder import PartsFolder, is_begun
-from probdmp.fleet.plan import PART_SAMPLES, Part, parts_of
+from probdmp.fleet.plan import PART_SAMPLES, PLAN, Part, parts_of
 from probdmp.fleet.scorer import Scorer
 from probdmp.fleet.scores import ENCODED, score_schema
 from probdmp.fleet.work import Assignment, score_here, score_in_processes
@@ -98,7 +98,7 @@ def score_executions(
     file, scorer = ParquetExecutions(executions), Scorer(payload, str(model))
     scorer.columns(file.layout, file.path)
     identity = {"schema": SCHEMA, "version": __version__, "model": scorer.digest, "executions": file.fingerprint}
-    folder = PartsFolder(target, identity, part_samples, restart)
+    folder = PartsFolder(target, identity | {"plan": PLAN}, part_samples, restart)
     try:
         parts = parts_of(file, file.executions(labels=False), folder.samples)
         done = folder.done()
