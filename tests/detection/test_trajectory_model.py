@@ -16,8 +16,10 @@ from probdmp.detection.trajectory_model import (
     MOVEMENT_FLOORS,
     MOVEMENT_HANDICAPS,
     TrajectoryModel,
+    all_of_it,
     as_suspicion,
 )
+from probdmp.detection.window_maps import Needed
 
 
 @pytest.fixture(scope="module")
@@ -55,6 +57,22 @@ def test_values_never_look_ahead(trajectories, seed, length, gaps):
     goals = np.full((1, 2), np.nan)
     whole = trajectory.values(paths, goals)
     np.testing.assert_allclose(trajectory.values(paths[:, :length], goals), whole[:, :length], rtol=1e-6, atol=1e-9)
+
+
+@settings(max_examples=15)
+@given(seeds, st.booleans(), st.sampled_from([-np.inf, -40.0, -5.0]), st.sampled_from([-20.0, 0.0, np.inf]))
+def test_what_matters_is_found_whatever_is_not_looked_at(trajectories, seed, gaps, floor, limit):
+    """The largest evidence of each channel if it is above its floor, and all above the limit; with samples missing too."""
+    trajectory, rng = trajectories[1], np.random.default_rng(seed)
+    paths = random_paths(trajectory.model, rng, 4, 110)
+    if gaps:
+        paths[:, 20:45] = np.nan  # were these zeros, it would stand still there
+    arguments = paths.transpose(1, 2, 0), np.full(4, 110), np.full((4, 2), np.nan)
+    whole = trajectory.evidence(*arguments, all_of_it)
+    found = trajectory.evidence(*arguments, lambda highest: Needed(np.full_like(highest, floor), np.full(len(highest), limit)))
+    highest = np.fmax.reduce(whole, axis=1)
+    at = (whole == highest[:, None]) & (whole > floor) | (whole > max(limit, floor))
+    np.testing.assert_array_equal(found[at], whole[at])
 
 
 def test_paths_of_different_lengths_do_not_hear_of_each_other(trajectories):

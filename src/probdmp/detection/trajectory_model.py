@@ -130,6 +130,8 @@ class TrajectoryModel:
             values[channel, is_over] = np.nan
             highest[channel] = np.fmax.reduce(values[channel], initial=np.nan)
         least = needed(highest)
+        if is_lossy:  # what is found of windows with zeros in place of what was not seen must not hide what is found of others
+            least = least._replace(limits=np.full_like(least.limits, -np.inf))
         for evidence, horizons in self._questions:
             wanted = np.maximum(min(length, evidence.last + 1) - np.array(evidence.horizons), 0)
             own = least.of([horizon.channel for horizon in horizons])
